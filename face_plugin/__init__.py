@@ -1,0 +1,1 @@
+"""Outward normals by Faraday cage estimation."""

@@ -1,0 +1,1 @@
+"""Steps of a filter chain, free of any host."""

@@ -1,1 +1,60 @@
-"""Outward normals by Faraday cage estimation."""
+"""Globally consistent outward normals for unoriented point clouds, by Faraday cage estimation (FaCE).
+
+Arrays in, arrays out::
+
+    import face_plugin
+
+    normals = face_plugin.estimate_normals(points).normals
+    surface = face_plugin.reconstruct(points)
+
+The hosts' own types are served by `face_plugin.adapters`, chains of steps by `face_plugin.filters`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from face_plugin.errors import FaceError, MeshingError, MissingDependencyError
+    from face_plugin.params import Params
+    from face_plugin.solver import FaCE, Result, Surface, estimate_normals, reconstruct
+
+__version__ = "0.1.0"
+__all__ = [
+    "FaCE",
+    "FaceError",
+    "MeshingError",
+    "MissingDependencyError",
+    "Params",
+    "Result",
+    "Surface",
+    "estimate_normals",
+    "reconstruct",
+]
+
+_HOME = {
+    "FaCE": "solver",
+    "FaceError": "errors",
+    "MeshingError": "errors",
+    "MissingDependencyError": "errors",
+    "Params": "params",
+    "Result": "solver",
+    "Surface": "solver",
+    "estimate_normals": "solver",
+    "reconstruct": "solver",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names on first use: numba and SciPy take longer to load than many scripts to run."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

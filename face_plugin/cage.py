@@ -1,0 +1,158 @@
+"""The Faraday cage: a small conducting ball at each point, approximated by a platonic solid (paper section 3.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+__all__ = ["Balls", "build_balls", "local_spacing", "thin"]
+
+Solid = Literal["octahedron", "icosahedron"]
+
+
+def _icosahedron() -> NDArray[np.float64]:
+    golden = (1 + 5**0.5) / 2
+    short = [(0.0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
+    vertices = np.array([np.roll(v, k) for k in range(3) for v in short])
+    return vertices / np.linalg.norm(vertices[0])
+
+
+SOLIDS: dict[str, NDArray[np.float64]] = {
+    "octahedron": np.concatenate([np.eye(3), -np.eye(3)]),
+    "icosahedron": _icosahedron(),
+}
+
+
+@dataclass(frozen=True)
+class Balls:
+    """The conductor: disjoint balls in the canonical frame."""
+
+    points: NDArray[np.intp]
+    """(b,) row of the cloud's point at the centre of each ball."""
+    centres: NDArray[np.float64]
+    """(b, 3) centres."""
+    radii: NDArray[np.float64]
+    """(b,) radii; no two balls touch."""
+    vertices: NDArray[np.float64]
+    """(b, s, 3) vertices of each ball, on its sphere."""
+
+
+def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[np.float64]:
+    """Mean distance of each point (n, 3) to its nearest `neighbours` others, in the points' unit.
+
+    Examples
+    --------
+    >>> local_spacing(np.arange(3.0)[:, None] * np.array([[1.0, 0, 0]]), 1)
+    array([1., 1., 1.])
+    """
+    k = min(neighbours, len(points) - 1)
+    distance, _ = cKDTree(points).query(points, k=k + 1, workers=-1)
+    return np.asarray(distance[:, 1:].mean(axis=1))
+
+
+def thin(
+    points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
+) -> NDArray[np.intp]:
+    """Poisson-disk subset: points taken in random order, each unless one nearer than its separation was taken.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    separation : (n,) float64, in the points' unit
+    seed : int
+
+    Returns
+    -------
+    (k,) intp
+        Rows of the points taken, ascending. Every point has one of them within its separation.
+
+    Examples
+    --------
+    >>> line = np.arange(4.0)[:, None] * np.array([[1.0, 0, 0]])
+    >>> len(thin(line, np.full(4, 0.5), seed=0))
+    4
+    """
+    order = np.random.default_rng(seed).permutation(len(points))
+    cell = float(separation.max())
+    if cell <= 0:
+        return np.arange(len(points))
+    tree = cKDTree(points)
+    nearest = tree.query(points, k=2, workers=-1)[0][:, 1]
+    crowded = np.flatnonzero(nearest < separation)
+    taken = np.ones(len(points), dtype=np.bool_)
+    if len(crowded) == 0:
+        return np.flatnonzero(taken)
+    lists = tree.query_ball_point(points[crowded], separation[crowded] * (1 - 1e-12), workers=-1)
+    length = np.fromiter((len(x) for x in lists), dtype=np.int64, count=len(lists))
+    start = np.zeros(len(points) + 1, dtype=np.int64)
+    start[crowded + 1] = length
+    np.cumsum(start, out=start)
+    neighbour = np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])
+    return np.flatnonzero(_greedy(order, start, neighbour))
+
+
+@numba.njit(cache=True)
+def _greedy(order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]) -> NDArray[np.bool_]:
+    taken = np.zeros(len(order), dtype=np.bool_)
+    for i in order:
+        free = True
+        for k in range(start[i], start[i + 1]):
+            if taken[neighbour[k]]:
+                free = False
+                break
+        taken[i] = free
+    return taken
+
+
+def build_balls(
+    points: NDArray[np.float64],
+    rows: NDArray[np.intp],
+    *,
+    radius: float = 0.45,
+    solid: Solid = "octahedron",
+    seed: int = 0,
+) -> Balls:
+    """Put a ball of `radius` times the distance to the nearest other one at each of `points[rows]`.
+
+    Each solid is turned at random, since equal orientations make the Delaunay tetrahedralisation degenerate.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, distinct
+    rows : (b,) intp
+        Which of the points carry a ball.
+    radius : float, fraction of the distance to the nearest other ball's centre; below 0.5 the balls are disjoint
+    solid : {"octahedron", "icosahedron"}
+    seed : int
+
+    Examples
+    --------
+    >>> build_balls(np.eye(3), np.arange(3)).vertices.shape
+    (3, 6, 3)
+    """
+    centres = points[rows]
+    nearest = cKDTree(centres).query(centres, k=2, workers=-1)[0][:, 1]
+    radii = radius * nearest
+    turns = _random_rotations(len(rows), seed)
+    vertices = centres[:, None] + radii[:, None, None] * np.einsum("sj,bij->bsi", SOLIDS[solid], turns)
+    return Balls(rows, centres, radii, vertices)
+
+
+def _random_rotations(count: int, seed: int) -> NDArray[np.float64]:
+    """(count, 3, 3) rotations, uniform over SO(3): from unit quaternions."""
+    w, x, y, z = np.random.default_rng(seed).normal(size=(4, count))
+    norm = np.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+    turns = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    return np.ascontiguousarray(turns.transpose(2, 0, 1))

@@ -1,0 +1,215 @@
+"""Check the input once and put it into a canonical frame.
+
+This is the only place that judges bad input. What leaves it is finite, distinct, of unit size, and in an order
+that depends on the positions alone, so that everything after it is independent of the order of the input and of
+where, how large and how rotated the object is.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Cloud", "Frame", "as_points", "prepare"]
+
+log = logging.getLogger(__name__)
+
+MINIMUM_POINTS = 4
+# Points nearer than this fraction of the diagonal are one point: below it, balls and tetrahedra degenerate in
+# double precision.
+MERGE_TOLERANCE = 1e-10
+# Smallest relative extent that still counts as a dimension of the object.
+FLAT_TOLERANCE = 1e-9
+# Principal axes are used only where they are well separated: on a cube or a sphere rounding would choose them.
+AXIS_GAP = 1e-3
+MORTON_BITS = 20
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Similarity between the input's coordinates and the canonical frame, ``x_unit = R (x - origin) / scale``.
+
+    Examples
+    --------
+    >>> frame = Frame(np.zeros(3), np.eye(3), 2.0)
+    >>> frame.to_unit(np.array([[2.0, 0.0, 0.0]]))
+    array([[1., 0., 0.]])
+    """
+
+    origin: NDArray[np.float64]
+    """(3,) centre of the input, in its unit."""
+    rotation: NDArray[np.float64]
+    """(3, 3) rotation R; its rows are the axes of the canonical frame."""
+    scale: float
+    """Length of the canonical frame's unit, in the input's unit."""
+
+    def to_unit(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Positions (k, 3) from the input's coordinates to the canonical frame."""
+        return ((np.asarray(points, dtype=np.float64) - self.origin) / self.scale) @ self.rotation.T
+
+    def from_unit(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions (k, 3) from the canonical frame to the input's coordinates."""
+        return (points @ self.rotation) * self.scale + self.origin
+
+    def rotate(self, vectors: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Directions (k, 3) from the input's axes to the canonical ones."""
+        return np.asarray(vectors, dtype=np.float64) @ self.rotation.T
+
+    def unrotate(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Directions (k, 3) from the canonical axes to the input's."""
+        return vectors @ self.rotation
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """The distinct points of the input in the canonical frame, and the way back."""
+
+    points: NDArray[np.float64]
+    """(m, 3) distinct points in the canonical frame, in Morton order."""
+    rows: NDArray[np.intp]
+    """(n,) the row of `points` that each input point became."""
+    frame: Frame
+    dtype: np.dtype[np.floating]
+    """Floating-point type of the input: results are given in it."""
+    flat: bool
+    """Whether the points lie in one plane: the side of their normals is then arbitrary."""
+
+    @property
+    def size(self) -> int:
+        """Number n of input points."""
+        return len(self.rows)
+
+
+def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
+    """Return `points` as a finite (n, 3) array of float32 or float64, or say what is wrong with it.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, what was found and what is allowed.
+
+    Examples
+    --------
+    >>> as_points([[0, 0, 1]]).dtype
+    dtype('float64')
+    """
+    try:
+        array = np.asarray(points)
+    except ValueError as error:
+        raise ValueError(f"{name} must be an (n, 3) array of numbers: {error}") from None
+    if array.dtype.kind in "iub":
+        array = array.astype(np.float64)
+    if array.dtype.kind != "f":
+        raise ValueError(f"{name} must hold real numbers, found dtype {array.dtype}")
+    if array.dtype not in (np.float32, np.float64):
+        array = array.astype(np.float32 if array.dtype.itemsize < 4 else np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        hint = "; transpose it" if array.ndim == 2 and array.shape[0] == 3 and array.shape[1] != 3 else ""
+        raise ValueError(f"{name} must have the shape (n, 3), found {array.shape}{hint}")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        first = ", ".join(map(str, bad[:5])) + (", ..." if len(bad) > 5 else "")
+        raise ValueError(
+            f"{name} must be finite, found NaN or infinity in {len(bad)} of {len(array)} rows: {first}"
+        )
+    return array
+
+
+def prepare(points: ArrayLike) -> Cloud:
+    """Check the input, merge coincident points and move them into the canonical frame.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of float or int, in any unit
+        At least four distinct points that do not lie on one line.
+
+    Returns
+    -------
+    Cloud
+
+    Raises
+    ------
+    ValueError
+        Wrong shape, NaN or infinity, fewer than four distinct points, or all points on one line.
+
+    Examples
+    --------
+    >>> prepare([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 3], [0, 0, 3]]).points.shape
+    (4, 3)
+    """
+    array = as_points(points)
+    if len(array) < MINIMUM_POINTS:
+        raise ValueError(f"points must hold at least {MINIMUM_POINTS} points, found {len(array)}")
+    work = array.astype(np.float64)
+    with np.errstate(over="ignore"):
+        lower, upper = work.min(axis=0), work.max(axis=0)
+        diagonal = float(np.linalg.norm(upper - lower))
+    if not np.isfinite(diagonal):
+        raise ValueError("points must span a finite length, found coordinates whose difference overflows")
+    if diagonal == 0.0 or not np.isfinite(1.0 / diagonal):
+        raise ValueError(f"points must be distinct, found {len(work)} points at one place")
+    origin = 0.5 * lower + 0.5 * upper
+    work = (work - origin) / diagonal
+    axes, extent = _axes(work)
+    if extent[1] <= FLAT_TOLERANCE:
+        raise ValueError("points must not all lie on one line: a line has no normal")
+    work = work @ axes.T
+    order, first = _distinct(work)
+    distinct = work[order[first]]
+    if len(distinct) < MINIMUM_POINTS:
+        raise ValueError(
+            f"points must hold at least {MINIMUM_POINTS} distinct points, found {len(distinct)} among {len(work)}"
+        )
+    rows = np.empty(len(work), dtype=np.intp)
+    rows[order] = np.cumsum(first) - 1
+    if len(distinct) < len(work):
+        log.info("%d of %d points coincide with another one", len(work) - len(distinct), len(work))
+    flat = bool(extent[2] <= FLAT_TOLERANCE)
+    if flat:
+        log.warning("all points lie in one plane: the side that their normals point to is arbitrary")
+    return Cloud(distinct, rows, Frame(origin, axes, diagonal), array.dtype, flat)
+
+
+def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rows: right-handed canonical axes of the points; and the points' relative extent along the principal ones."""
+    centred = points - points.mean(axis=0)
+    variance, vectors = np.linalg.eigh(centred.T @ centred / len(points))
+    variance, axes = np.maximum(variance[::-1], 0.0), vectors[:, ::-1].T
+    extent = np.ptp(centred @ axes.T, axis=0) / np.ptp(centred @ axes[0])
+    if np.min((variance[:2] - variance[1:]) / variance[0]) < AXIS_GAP:
+        return np.eye(3), extent
+    # An axis has no sign of its own: take the one with positive skewness, which turns with the points.
+    skewness = ((centred @ axes.T) ** 3).mean(axis=0)
+    axes = axes * np.where(skewness < 0, -1.0, 1.0)[:, None]
+    if np.linalg.det(axes) < 0:
+        axes[np.argmin(np.abs(skewness) / np.maximum(variance, 1e-300) ** 1.5)] *= -1
+    return axes, extent
+
+
+def _distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Morton order of points of unit size, and which of the sorted ones is not its predecessor's twin."""
+    lower = points.min(axis=0)
+    cell = np.floor((points - lower) * (2**MORTON_BITS - 1) / np.ptp(points, axis=0).max()).astype(np.uint64)
+    code = np.zeros(len(points), dtype=np.uint64)
+    for axis in range(3):
+        code |= _spread_bits(cell[:, axis]) << np.uint64(axis)
+    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0], code))
+    sorted_points = points[order]
+    step = np.abs(np.diff(sorted_points, axis=0)).max(axis=1)
+    return order, np.concatenate([[True], step > MERGE_TOLERANCE])
+
+
+def _spread_bits(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Put two zero bits between the bits of 21-bit integers."""
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        x = (x | (x << np.uint64(shift))) & np.uint64(mask)
+    return x

@@ -1,0 +1,146 @@
+"""The electric field: gradients of the potentials, and the greatest strength that any external field causes."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.meshers import CageMesh
+
+__all__ = ["half_icosahedron", "strength_exact", "strength_of_directions", "vertex_gradients"]
+
+
+def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Gradients of piecewise linear functions, averaged at each vertex over its tetrahedra by volume (paper 3.3).
+
+    Parameters
+    ----------
+    mesh : CageMesh
+    values : (m, s) float64
+        A column a function.
+
+    Returns
+    -------
+    (m, 3, s) float64
+        Column k holds the gradient of function k. Zero at a vertex that no tetrahedron uses.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> mesh = CageMesh(corners, np.array([[0, 1, 2, 3]], dtype=np.int32), *4 * [np.empty(0)])
+    >>> vertex_gradients(mesh, corners @ np.array([[1.0], [2.0], [3.0]]))[0].ravel()
+    array([1., 2., 3.])
+    """
+    return np.asarray(_vertex_gradients(mesh.vertices, mesh.tets, np.ascontiguousarray(values)))
+
+
+@numba.njit(cache=True)
+def _vertex_gradients(vertices, tets, values):  # type: ignore[no-untyped-def]
+    scenarios = values.shape[1]
+    out = np.zeros((len(vertices), 3, scenarios))
+    weight = np.zeros(len(vertices))
+    n = np.empty((4, 3))
+    g = np.empty((3, scenarios))
+    for t in range(len(tets)):
+        tet = tets[t]
+        a = vertices[tet[1]] - vertices[tet[0]]
+        b = vertices[tet[2]] - vertices[tet[0]]
+        c = vertices[tet[3]] - vertices[tet[0]]
+        n[1, 0], n[1, 1], n[1, 2] = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+        n[2, 0], n[2, 1], n[2, 2] = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
+        n[3, 0], n[3, 1], n[3, 2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+        # Six volumes times the gradient: the volume weight needs no division.
+        six = a[0] * n[1, 0] + a[1] * n[1, 1] + a[2] * n[1, 2]
+        for d in range(3):
+            for s in range(scenarios):
+                base = values[tet[0], s]
+                g[d, s] = (
+                    n[1, d] * (values[tet[1], s] - base)
+                    + n[2, d] * (values[tet[2], s] - base)
+                    + n[3, d] * (values[tet[3], s] - base)
+                )
+        for k in range(4):
+            v = tet[k]
+            weight[v] += six
+            for d in range(3):
+                for s in range(scenarios):
+                    out[v, d, s] += g[d, s]
+    for v in range(len(vertices)):
+        if weight[v] > 0:
+            out[v] /= weight[v]
+    return out
+
+
+def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """E_max over all directions: the largest singular value of each 3x3 matrix of gradients.
+
+    The potential is linear in the direction v of the external field, so with the three basis solutions in the columns
+    of G its field is G v, and ``max |G v|`` over unit v is the largest singular value of G: the limit of paper
+    equation 5 for infinitely many directions, at the price of three.
+
+    Parameters
+    ----------
+    gradients : (m, 3, 3) float64
+
+    Returns
+    -------
+    (m,) float64
+
+    Examples
+    --------
+    >>> strength_exact(np.diag([1.0, -3.0, 2.0])[None])
+    array([3.])
+    """
+    return np.asarray(_strength_exact(np.ascontiguousarray(gradients)))
+
+
+@numba.njit(cache=True)
+def _strength_exact(gradients):  # type: ignore[no-untyped-def]
+    """Largest eigenvalue of G^T G from the trigonometric solution of its characteristic cubic."""
+    out = np.empty(len(gradients))
+    for i in range(len(gradients)):
+        m = gradients[i].T @ gradients[i]
+        q = (m[0, 0] + m[1, 1] + m[2, 2]) / 3.0
+        off = m[0, 1] ** 2 + m[0, 2] ** 2 + m[1, 2] ** 2
+        p = np.sqrt(((m[0, 0] - q) ** 2 + (m[1, 1] - q) ** 2 + (m[2, 2] - q) ** 2 + 2.0 * off) / 6.0)
+        largest = q
+        if p > 1e-14 * q:
+            b00, b11, b22 = (m[0, 0] - q) / p, (m[1, 1] - q) / p, (m[2, 2] - q) / p
+            b01, b02, b12 = m[0, 1] / p, m[0, 2] / p, m[1, 2] / p
+            half = 0.5 * (
+                b00 * (b11 * b22 - b12 * b12) - b01 * (b01 * b22 - b12 * b02) + b02 * (b01 * b12 - b11 * b02)
+            )
+            largest = q + 2.0 * p * np.cos(np.arccos(min(1.0, max(-1.0, half))) / 3.0)
+        out[i] = np.sqrt(max(largest, 0.0))
+    return out
+
+
+def half_icosahedron() -> NDArray[np.float64]:
+    """The paper's six directions (6, 3): one of each antipodal pair of an icosahedron's vertices (section 3.2).
+
+    Examples
+    --------
+    >>> half_icosahedron().shape
+    (6, 3)
+    """
+    from face_plugin.cage import SOLIDS
+
+    vertices = SOLIDS["icosahedron"]
+    return vertices[(vertices @ np.array([1.0, 0.1, 0.01])) > 0]
+
+
+def strength_of_directions(
+    gradients: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """E_max over given unit directions (d, 3): ``max |G v|`` (paper equation 5).
+
+    Examples
+    --------
+    >>> strength_of_directions(np.diag([1.0, -3.0, 2.0])[None], np.eye(3)[2:])
+    array([2.])
+    """
+    out = np.zeros(len(gradients))
+    for v in directions:
+        np.maximum(out, np.linalg.norm(gradients @ v, axis=1), out=out)
+    return out

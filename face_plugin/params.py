@@ -1,0 +1,127 @@
+"""All settings in one place."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args
+
+__all__ = ["ALPHAS", "Params"]
+
+Alpha = Literal["auto", "dense", "sparse"]
+
+ALPHAS: dict[str, float] = {"dense": 0.01, "sparse": 0.05}
+"""The paper's thresholds by name (section 3.5): "dense" for complete input, "sparse" for input with large gaps."""
+
+CHOICES: dict[str, tuple[str, ...]] = {
+    "solid": ("octahedron", "icosahedron"),
+    "mesher": ("auto", "delaunay", "tetgen", "tetwild"),
+    "directions": ("exact", "icosahedron"),
+    "solver": ("auto", "cholmod", "superlu"),
+    "angles": ("refined", "field"),
+    "inside": ("rays", "winding"),
+}
+
+
+@dataclass(frozen=True)
+class Params:
+    """Settings of the method; None means derived from the data.
+
+    Raises
+    ------
+    ValueError
+        A field is outside its range; the message names it.
+
+    Examples
+    --------
+    >>> Params(solid="icosahedron").padding
+    0.1
+    """
+
+    # Cage
+    ball_radius: float = 0.45
+    """Radius of a ball, as a fraction of the distance to the nearest other one; (0, 0.5)."""
+    solid: Literal["octahedron", "icosahedron"] = "octahedron"
+    """Solid that approximates a ball: 6 or 12 vertices."""
+    cage_spacing: float | None = None
+    """Smallest distance between two balls, in the unit of the input; 0 = a ball at every point;
+    None = half the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings."""
+
+    # Domain and mesh
+    padding: float = 0.1
+    """Space around the object, as a fraction of its shortest side; > 0."""
+    mesher: Literal["auto", "delaunay", "tetgen", "tetwild"] = "auto"
+    """Mesher; "auto" is "delaunay"."""
+    grading: float = 0.8
+    """Size of the tetrahedra far from the points, as a fraction of the distance to the nearest; (0, 2]."""
+    finest: float = 1.5
+    """Size of the smallest cells of free vertices, in local spacings; (0, 10]."""
+
+    # Field
+    directions: Literal["exact", "icosahedron"] = "exact"
+    """External fields: the maximum over all directions, or the paper's six."""
+    solver: Literal["auto", "cholmod", "superlu"] = "auto"
+    """Sparse factorisation; "auto" is CHOLMOD where scikit-sparse is installed."""
+
+    # Normals
+    angles: Literal["refined", "field"] = "refined"
+    """Normals refined from the points themselves, or the plain gradient of the field strength (the paper's)."""
+
+    # Interior
+    alpha: float | Literal["auto", "dense", "sparse"] = "auto"
+    """Field strength (unshielded space has 1) below which space counts as inside; (0, 1); the names are 0.01 and 0.05."""
+    inside: Literal["rays", "winding"] = "rays"
+    """Test of a point against the isosurface: embree rays, or the winding number."""
+
+    # Everything
+    seed: int = 0
+    """Seed of the random turns, jitters and orders; >= 0."""
+
+    def __post_init__(self) -> None:
+        _number(self, "ball_radius", 0.0, 0.5)
+        _number(self, "padding", 0.0, 100.0)
+        _number(self, "grading", 0.0, 2.0, closed=True)
+        _number(self, "finest", 0.0, 10.0, closed=True)
+        if self.cage_spacing is not None:
+            _number(self, "cage_spacing", 0.0, math.inf, least=True)
+        if isinstance(self.alpha, str):
+            if self.alpha not in get_args(Alpha):
+                raise ValueError(f"alpha must be a number or one of {get_args(Alpha)}, found {self.alpha!r}")
+        else:
+            _number(self, "alpha", 0.0, 1.0)
+        for name, allowed in CHOICES.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {allowed}, found {getattr(self, name)!r}")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+            raise ValueError(f"seed must be an integer >= 0, found {self.seed!r}")
+
+    @classmethod
+    def paper(cls, **changes: Any) -> Params:
+        """Return the paper's own choices: icosahedra at every point, TetGen, six directions, plain gradients.
+
+        Examples
+        --------
+        >>> Params.paper().directions
+        'icosahedron'
+        """
+        paper = cls(
+            solid="icosahedron", cage_spacing=0.0, mesher="tetgen", directions="icosahedron", angles="field"
+        )
+        return dataclasses.replace(paper, **changes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields by name, for JSON."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def _number(
+    params: Params, name: str, low: float, high: float, *, closed: bool = False, least: bool = False
+) -> None:
+    """Raise unless the field is a number in (low, high); `closed` admits `high`, `least` admits `low`."""
+    value = getattr(params, name)
+    span = f"{'[' if least else '('}{low:g}, {high:g}{']' if closed else ')'}"
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ValueError(f"{name} must be a finite number in {span}, found {value!r}")
+    if not (low < value < high or (least and value == low) or (closed and value == high)):
+        raise ValueError(f"{name} must be in {span}, found {value!r}")

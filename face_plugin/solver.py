@@ -1,0 +1,293 @@
+"""The method, end to end: unoriented points in, outward normals and a surface out."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from face_plugin import cage, cloud, domain, field, normals
+from face_plugin.meshers.delaunay import delaunay_mesh
+from face_plugin.params import ALPHAS, Params
+from face_plugin.poisson import Poisson
+from face_plugin.surface import Backend, poisson_reconstruction
+
+__all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
+
+log = logging.getLogger(__name__)
+
+Progress = Callable[[str, float], None]
+"""Called with the name of a stage and 0.0 at its start, 1.0 at its end."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What the method says of each input point, in the order of the input."""
+
+    normals: NDArray[np.floating]
+    """(n, 3) outward unit normals, in the input's floating-point type."""
+    strength: NDArray[np.floating]
+    """(n,) E_max at the point's ball; unshielded space has 1."""
+    confidence: NDArray[np.floating]
+    """(n,) confidence in the side of the normal, in [0, 1]."""
+    interior: NDArray[np.bool_] | None
+    """(n,) whether the point lies inside the object; None where it was not asked for."""
+    timings: dict[str, float]
+    """Seconds by stage."""
+    params: Params
+    """The settings as resolved."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A reconstructed surface."""
+
+    vertices: NDArray[np.float64]
+    """(k, 3) in the unit of the input."""
+    faces: NDArray[np.int64]
+    """(f, 3) oriented outward."""
+    densities: NDArray[np.float64] | None
+    """(k,) sampling density at the vertices, where the host gives it."""
+    result: Result
+    """The normals, and the points kept, that it was made from."""
+
+
+class FaCE:
+    """The solved cage: keeps the mesh, the factorisation and the field, and answers questions about them.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of float or int, in any unit
+    params : Params, optional
+    progress : callable, optional
+        ``progress(stage, fraction)``.
+
+    Attributes
+    ----------
+    cloud : Cloud
+        The distinct points in the canonical frame; `frame` is the way between it and the input.
+    balls : Balls
+    mesh : CageMesh
+    poisson : Poisson
+    vertex_strength : (m,) float64
+        E_max at the vertices of the mesh.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> face = FaCE(ball.points)
+    >>> bool(((face.normals() * ball.normals).sum(axis=1) > 0).all())
+    True
+    """
+
+    def __init__(self, points: ArrayLike, params: Params | None = None, *, progress: Progress | None = None) -> None:
+        self.params = params or Params()
+        self.timings: dict[str, float] = {}
+        self._progress = progress or (lambda stage, fraction: None)
+        self._solve(points)
+
+    def _solve(self, points: ArrayLike) -> None:
+        params = self.params
+        # 1. Check the points and put them into a canonical frame.
+        with self._stage("cloud"):
+            self.cloud = cloud.prepare(points)
+            self.frame = self.cloud.frame
+        # 2. A conducting ball at each point, near-duplicates left out.
+        with self._stage("cage"):
+            rows = cage.thin(self.cloud.points, self._separation(), params.seed)
+            self.balls = cage.build_balls(
+                self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
+            )
+        # 3. A padded box, and free vertices that grade from the balls to it.
+        with self._stage("domain"):
+            box = domain.padded_box(self.balls, params.padding)
+            spacing = cage.local_spacing(self.balls.centres)
+            filling = domain.fill(
+                self.balls, spacing, box, grading=params.grading, finest=params.finest, seed=params.seed
+            )
+        # 4. Tetrahedra between the box and the balls.
+        with self._stage("mesh"):
+            self.mesh = delaunay_mesh(self.balls, filling, box)
+        # 5. Potentials in three basis fields; every other direction is their combination.
+        with self._stage("poisson"):
+            self.poisson = Poisson(self.mesh, params.solver)
+            self._potential = self.poisson.solve(self.mesh.vertices[self.mesh.boundary])
+        # 6. The greatest strength that an external field of any direction causes.
+        with self._stage("field"):
+            gradients = field.vertex_gradients(self.mesh, self._potential)
+            if params.directions == "exact":
+                self.vertex_strength = field.strength_exact(gradients)
+            else:
+                self.vertex_strength = field.strength_of_directions(gradients, field.half_icosahedron())
+
+    def _separation(self) -> NDArray[np.float64]:
+        """Smallest distance between balls at each point, in the canonical frame."""
+        points = self.cloud.points
+        if self.params.cage_spacing is not None:
+            return np.full(len(points), self.params.cage_spacing / self.frame.scale)
+        eighth = cKDTree(points).query(points, k=[min(9, len(points))], workers=-1)[0][:, 0]
+        return np.asarray(0.5 * eighth)
+
+    @cached_property
+    def _normals(self) -> NDArray[np.float64]:
+        with self._stage("normals"):
+            at_balls = normals.field_normals(self.mesh, self.vertex_strength)
+            at_points = normals.carry(self.balls.centres, at_balls, self.cloud.points)
+            return self.frame.unrotate(at_points)[self.cloud.rows]
+
+    def normals(self) -> NDArray[np.floating]:
+        """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
+        return self._normals.astype(self.cloud.dtype)
+
+    def potential(self) -> NDArray[np.float64]:
+        """Potentials (m, 3) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""
+        return self._potential
+
+    def strength(self, query: ArrayLike) -> NDArray[np.float64]:
+        """E_max at any position, by linear interpolation between the vertices of the mesh.
+
+        Parameters
+        ----------
+        query : (k, 3) array_like, in the unit of the input
+
+        Returns
+        -------
+        (k,) float64
+            Inside a ball, the mean of its cage vertices; outside the box, 1, the strength of unshielded space.
+        """
+        local = self.frame.to_unit(cloud.as_points(query, "query"))
+        return self._locator(local)
+
+    @cached_property
+    def _locator(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        from face_plugin.locate import interpolator
+
+        return interpolator(self.mesh, self.balls, self.vertex_strength)
+
+    def interior(self, alpha: float | str | None = None) -> NDArray[np.bool_]:
+        """Which input points (n,) lie inside the object; `alpha` as in `Params`. Nothing is solved again."""
+        raise NotImplementedError
+
+    def result(self, *, filter_interior: bool = False) -> Result:
+        """Everything that is known of the input points."""
+        dtype, rows = self.cloud.dtype, self.cloud.rows
+        ball = cKDTree(self.balls.centres).query(self.cloud.points, workers=-1)[1][rows]
+        at_balls = normals.ball_means(self.mesh, self.vertex_strength)
+        return Result(
+            normals=self.normals(),
+            strength=at_balls[ball].astype(dtype),
+            confidence=np.ones(len(rows), dtype=dtype),
+            interior=self.interior() if filter_interior else None,
+            timings=dict(self.timings),
+            params=self.params,
+        )
+
+    @contextmanager
+    def _stage(self, name: str) -> Iterator[None]:
+        """Time a stage, and report its start and end."""
+        self._progress(name, 0.0)
+        start = time.perf_counter()
+        yield
+        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
+        log.debug("%s: %.3f s", name, self.timings[name])
+        self._progress(name, 1.0)
+
+
+def estimate_normals(
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    filter_interior: bool = False,
+    progress: Progress | None = None,
+) -> Result:
+    """Outward normals of an unoriented point cloud by Faraday cage estimation.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of float or int, in any unit
+        At least four distinct points that do not lie on one line. Duplicates are allowed.
+    params : Params, optional
+    filter_interior : bool
+        Also classify the points as interior or not.
+    progress : callable, optional
+        ``progress(stage, fraction)``.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ValueError
+        Bad input; the message names the argument, what was found and what is allowed.
+    MeshingError
+        The space between the box and the balls could not be meshed.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> normals = estimate_normals(ball.points).normals
+    >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
+    True
+    """
+    return FaCE(points, params, progress=progress).result(filter_interior=filter_interior)
+
+
+def reconstruct(
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    screened: bool = True,
+    depth: int = 8,
+    filter_interior: bool = True,
+    backend: Backend | None = None,
+    trim: float = 0.0,
+    progress: Progress | None = None,
+) -> Surface:
+    """Closed surface of an unoriented point cloud: normals, interior points dropped, Poisson reconstruction.
+
+    Parameters
+    ----------
+    points, params, progress
+        As in `estimate_normals`.
+    screened : bool
+        Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
+    depth : int
+        Depth of the reconstruction's octree, 1 to 16.
+    filter_interior : bool
+        Leave out the points inside the object.
+    backend : {"open3d", "pymeshlab"}, optional
+        Host that reconstructs; by default whichever is installed.
+    trim : float
+        Fraction of the vertices to drop, those of lowest density. This opens the surface.
+
+    Returns
+    -------
+    Surface
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> surface = reconstruct(sphere(500).points, depth=5)
+    >>> surface.faces.shape[1]
+    3
+    """
+    face = FaCE(points, params, progress=progress)
+    result = face.result(filter_interior=filter_interior)
+    keep = slice(None) if result.interior is None else ~result.interior
+    array = cloud.as_points(points)
+    with face._stage("surface"):
+        vertices, faces, densities = poisson_reconstruction(
+            array[keep], result.normals[keep], depth=depth, screened=screened, backend=backend, trim=trim
+        )
+    return Surface(vertices, faces, densities, dataclasses.replace(result, timings=dict(face.timings)))

@@ -1,0 +1,136 @@
+"""Poisson surface reconstruction (PSR) through a host that is installed."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.errors import MissingDependencyError, require
+
+__all__ = ["Backend", "poisson_reconstruction"]
+
+log = logging.getLogger(__name__)
+
+Backend = Literal["open3d", "pymeshlab"]
+BACKENDS: tuple[Backend, ...] = ("open3d", "pymeshlab")
+DEPTHS = (1, 16)
+# Weight of the points in the screened variant: the value that Kazhdan and Hoppe recommend for linear elements, and
+# the default of both hosts.
+SCREENING = 4.0
+
+Mesh = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
+
+
+def poisson_reconstruction(
+    points: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    *,
+    depth: int = 8,
+    screened: bool = True,
+    backend: Backend | None = None,
+    trim: float = 0.0,
+) -> Mesh:
+    """Reconstruct a surface from oriented points (Kazhdan and Hoppe 2013, screened; Kazhdan et al. 2006, not).
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float
+        Points in any unit, and outward unit normals.
+    depth : int, 1 to 16
+        Depth of the octree: the finest cell is 1.1 x the longest side / 2**depth (Open3D).
+    screened : bool
+    backend : {"open3d", "pymeshlab"}, optional
+        By default whichever is installed, Open3D first.
+    trim : float, fraction in [0, 1)
+        Drop the vertices whose sampling density is in this lowest fraction (Open3D only). This opens the surface.
+
+    Returns
+    -------
+    vertices : (k, 3) float64
+    faces : (f, 3) int64
+        Oriented outward.
+    densities : (k,) float64 or None
+        Sampling density at the vertices; None from PyMeshLab, which does not give it.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range.
+    MissingDependencyError
+        No host is installed; with the line to install one.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> vertices, faces, _ = poisson_reconstruction(ball.points, ball.normals, depth=5)
+    >>> vertices.shape[1], faces.shape[1]
+    (3, 3)
+    """
+    if isinstance(depth, bool) or not isinstance(depth, (int, np.integer)) or not DEPTHS[0] <= depth <= DEPTHS[1]:
+        raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
+    if not 0.0 <= trim < 1.0:
+        raise ValueError(f"trim must be in [0, 1), found {trim!r}")
+    if backend is None:
+        backend = _installed()
+    if backend not in BACKENDS:
+        raise ValueError(f"backend must be one of {BACKENDS} or None, found {backend!r}")
+    if trim > 0 and backend != "open3d":
+        raise ValueError(f"trim needs the backend 'open3d', which gives densities; found {backend!r}")
+    # Hosts work partly in single precision: reconstruct near the origin and at unit size.
+    origin = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
+    size = float(np.ptp(points, axis=0).max())
+    local = (points.astype(np.float64) - origin) / size
+    run = _open3d if backend == "open3d" else _pymeshlab
+    vertices, faces, densities = run(local, normals.astype(np.float64), int(depth), SCREENING * screened)
+    if trim > 0 and densities is not None:
+        vertices, faces, densities = _trimmed(vertices, faces, densities, trim)
+    return vertices * size + origin, faces, densities
+
+
+def _installed() -> Backend:
+    for name in BACKENDS:
+        if importlib.util.find_spec(name) is not None:
+            return name
+    raise MissingDependencyError(
+        "surface reconstruction needs Open3D or PyMeshLab: pip install 'face-plugin[open3d]' "
+        "or pip install 'face-plugin[pymeshlab]'"
+    )
+
+
+def _open3d(points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float) -> Mesh:
+    o3d = require("open3d", extra="open3d")
+    pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    pcd.normals = o3d.utility.Vector3dVector(normals)
+    # One thread: with more, the order of summation, and so the surface, changes from run to run.
+    mesh, densities = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
+        pcd, depth=depth, point_weight=weight, n_threads=1
+    )
+    return (
+        np.asarray(mesh.vertices).copy(),
+        np.asarray(mesh.triangles).astype(np.int64),
+        np.asarray(densities).copy(),
+    )
+
+
+def _pymeshlab(points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float) -> Mesh:
+    pymeshlab = require("pymeshlab", extra="pymeshlab")
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
+    meshes.generate_surface_reconstruction_screened_poisson(depth=depth, pointweight=weight, preclean=False)
+    mesh = meshes.current_mesh()
+    return mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64), None
+
+
+def _trimmed(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], densities: NDArray[np.float64], trim: float
+) -> Mesh:
+    keep = densities >= np.quantile(densities, trim)
+    faces = faces[keep[faces].all(axis=1)]
+    used = np.zeros(len(vertices), dtype=np.bool_)
+    used[faces] = True
+    return vertices[used], (np.cumsum(used) - 1)[faces], densities[used]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from face_plugin.shapes.shape import Shape, from_solids
-from face_plugin.shapes.solids import Array, Solid, arc, ball, block, capsule, cone, egg, line, ring
+from face_plugin.shapes.solids import Solid, arc, ball, block, capsule, cone, dish, egg, mug, ring, shell
 
 
 def sphere(n: int, seed: int = 0, *, radius: float = 1.0) -> Shape:
@@ -55,26 +54,12 @@ def nested_box(n: int, seed: int = 0) -> Shape:
 
 def spherical_shell(n: int, seed: int = 0, *, inner: float = 0.5) -> Shape:
     """Ball of radius 1 around an empty ball of radius `inner`: the cavity's normals point to its centre."""
-    hollow = arc((0.0, 0.0), inner, -np.pi / 2, np.pi / 2, hollow=True)
-
-    def level(p: Array) -> Array:
-        r: Array = np.linalg.norm(p, axis=1)
-        return np.maximum(r - 1.0, inner - r)
-
-    return from_solids([Solid((*ball(1.0).patches, hollow), level)], n, seed)
+    return from_solids([shell(inner)], n, seed)
 
 
 def bowl(n: int, seed: int = 0, *, thickness: float = 0.1) -> Shape:
     """Lower half of a unit ball, hollowed to a wall of `thickness`, open at the top."""
-    inner = 1.0 - thickness
-    patches = (arc((0.0, 0.0), 1.0, -np.pi / 2, 0.0), line((1.0, 0.0), (inner, 0.0)),
-               arc((0.0, 0.0), inner, -np.pi / 2, 0.0, hollow=True))
-
-    def level(p: Array) -> Array:
-        r: Array = np.linalg.norm(p, axis=1)
-        return np.maximum(np.maximum(r - 1.0, inner - r), p[:, 2])
-
-    return from_solids([Solid(patches, level)], n, seed)
+    return from_solids([dish(thickness)], n, seed)
 
 
 def open_sheet(n: int, seed: int = 0) -> Shape:
@@ -84,17 +69,7 @@ def open_sheet(n: int, seed: int = 0) -> Shape:
 
 def cup(n: int, seed: int = 0, *, depth: float = 3.0, thickness: float = 0.1) -> Shape:
     """Mug without a handle: inner diameter 1, `depth` diameters deep, wall and floor of `thickness`."""
-    inner, outer = 0.5, 0.5 + thickness
-    outside = [(0.0, -thickness), (outer, -thickness), (outer, depth)]
-    profile = [*outside, (inner, depth), (inner, 0.0), (0.0, 0.0)]
-    patches = tuple(line(a, b) for a, b in pairwise(profile))
-
-    def level(p: Array) -> Array:
-        r, z = np.hypot(p[:, 0], p[:, 1]), p[:, 2]
-        hull = np.maximum(r - outer, np.maximum(z - depth, -thickness - z))
-        return np.maximum(hull, -np.maximum(r - inner, -z))
-
-    return from_solids([Solid(patches, level)], n, seed)
+    return from_solids([mug(depth, thickness)], n, seed)
 
 
 def crossed_cylinders(n: int, seed: int = 0) -> Shape:

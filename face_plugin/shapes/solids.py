@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -179,3 +180,37 @@ def egg(axes: ArrayLike) -> Solid:
         return unit * scale, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
     return Solid((Patch(area, sample),), lambda p: np.linalg.norm(p / scale, axis=1) - 1.0)
+
+
+def shell(inner: float) -> Solid:
+    """Ball of radius 1 with an empty ball of radius `inner` at its centre."""
+    hollow = arc((0.0, 0.0), inner, -np.pi / 2, np.pi / 2, hollow=True)
+
+    def level(p: Array) -> Array:
+        r: Array = np.linalg.norm(p, axis=1)
+        return np.maximum(r - 1.0, inner - r)
+
+    return Solid((*ball(1.0).patches, hollow), level)
+
+
+def dish(thickness: float) -> Solid:
+    """Lower half of a `shell` with a wall of `thickness`."""
+    inner = 1.0 - thickness
+    patches = (arc((0.0, 0.0), 1.0, -np.pi / 2, 0.0), line((1.0, 0.0), (inner, 0.0)),
+               arc((0.0, 0.0), inner, -np.pi / 2, 0.0, hollow=True))
+    whole = shell(inner)
+    return Solid(patches, lambda p: np.maximum(whole.level(p), p[:, 2]))
+
+
+def mug(depth: float, thickness: float) -> Solid:
+    """Cylinder of inner radius 0.5, open at the top, with its floor at z = 0 and a wall of `thickness`."""
+    inner, outer = 0.5, 0.5 + thickness
+    outside = [(0.0, -thickness), (outer, -thickness), (outer, depth)]
+    profile = [*outside, (inner, depth), (inner, 0.0), (0.0, 0.0)]
+
+    def level(p: Array) -> Array:
+        r, z = np.hypot(p[:, 0], p[:, 1]), p[:, 2]
+        hull = np.maximum(r - outer, np.maximum(z - depth, -thickness - z))
+        return np.maximum(hull, -np.maximum(r - inner, -z))
+
+    return Solid(tuple(line(a, b) for a, b in pairwise(profile)), level)

@@ -254,8 +254,11 @@ def _cholmod(matrix: sparse.csc_matrix, *, required: bool) -> Solve | None:
             raise
         log.info("scikit-sparse is not installed: SuperLU is used, about three times slower")
         return None
-    if hasattr(cholmod, "cholesky"):  # scikit-sparse < 0.5
-        factor = cholmod.cholesky(matrix, ordering_method="amd")
-        return lambda b: np.asarray(factor(b))
-    factor = cholmod.cho_factor(matrix, order="amd")
-    return lambda b: np.asarray(factor.solve(b))
+    # "default" takes AMD where it fills little, and else METIS, where that is installed: at 59,000 unknowns
+    # 1.8 s and 7.5 million entries in the factor, with AMD 2.8 s and 11.4 million.
+    if hasattr(cholmod, "cho_factor"):
+        factor = cholmod.cho_factor(matrix, order="default")
+        return lambda b: np.asarray(factor.solve(b))
+    # scikit-sparse < 0.5
+    factor = cholmod.cholesky(matrix, ordering_method="default")
+    return lambda b: np.asarray(factor(b))

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from face_plugin import cage, cloud, domain, field, normals
+from face_plugin.locate import Locator
 from face_plugin.meshers.delaunay import delaunay_mesh
 from face_plugin.params import ALPHAS, Params
 from face_plugin.poisson import Poisson
@@ -165,13 +166,12 @@ class FaCE:
             Inside a ball, the mean of its cage vertices; outside the box, 1, the strength of unshielded space.
         """
         local = self.frame.to_unit(cloud.as_points(query, "query"))
-        return self._locator(local)
+        return self.locator.interpolate(local, self.vertex_strength, outside=1.0)
 
     @cached_property
-    def _locator(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-        from face_plugin.locate import interpolator
-
-        return interpolator(self.mesh, self.balls, self.vertex_strength)
+    def locator(self) -> Locator:
+        """Interpolation of any values at the vertices of the mesh, for positions in the canonical frame."""
+        return Locator(self.mesh)
 
     def interior(self, alpha: float | str | None = None) -> NDArray[np.bool_]:
         """Which input points (n,) lie inside the object; `alpha` as in `Params`. Nothing is solved again."""

@@ -14,8 +14,9 @@ _DENSITY = 0.61
 _ROUNDS = 12
 
 
-def _darts(points: NDArray[np.float64], rank: NDArray[np.int64], radius: float,
-           normals: NDArray[np.float64] | None) -> NDArray[np.int64]:
+def _darts(
+    points: NDArray[np.float64], rank: NDArray[np.int64], radius: float, normals: NDArray[np.float64] | None
+) -> NDArray[np.int64]:
     """Throw the points in order of `rank`, keeping each that has no kept one within `radius`."""
     pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
     if normals is not None:
@@ -53,8 +54,35 @@ def _trim(points: NDArray[np.float64], kept: NDArray[np.int64], n: int) -> NDArr
     return kept
 
 
-def evenly(points: ArrayLike, n: int, rng: np.random.Generator, *,
-           normals: NDArray[np.float64] | None = None) -> NDArray[np.int64]:
+def apart(points: ArrayLike, radius: float, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Choose points in random order so that no two are within `radius` of one another, as many as fit.
+
+    Parameters
+    ----------
+    points
+        (m, 3).
+    radius
+        In their unit, above 0.
+    rng
+        Its state decides the outcome.
+
+    Returns
+    -------
+    (n,) int64, ascending indices into `points`.
+
+    Examples
+    --------
+    >>> line = np.arange(9)[:, None] * [0.1, 0.0, 0.0]
+    >>> 3 <= len(apart(line, 0.25, np.random.default_rng(0))) <= 4
+    True
+    """
+    candidates = np.asarray(points, dtype=np.float64)
+    return _darts(candidates, rng.permutation(len(candidates)), radius, None)
+
+
+def evenly(
+    points: ArrayLike, n: int, rng: np.random.Generator, *, normals: NDArray[np.float64] | None = None
+) -> NDArray[np.int64]:
     """Choose `n` evenly spread points of a dense random sample of a surface.
 
     Darts are thrown in random order at a radius found by iteration; what is left over of the count goes by

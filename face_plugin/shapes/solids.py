@@ -131,8 +131,11 @@ def cone(bottom: float, top: float, height: float) -> Solid:
 def capsule(radius: float, length: float) -> Solid:
     """Cylinder of `length` about z with half balls at its ends."""
     h = length / 2
-    patches = (arc((0.0, -h), radius, -np.pi / 2, 0.0), line((radius, -h), (radius, h)),
-               arc((0.0, h), radius, 0.0, np.pi / 2))
+    patches = (
+        arc((0.0, -h), radius, -np.pi / 2, 0.0),
+        line((radius, -h), (radius, h)),
+        arc((0.0, h), radius, 0.0, np.pi / 2),
+    )
 
     def level(p: Array) -> Array:
         beyond = p[:, 2] - np.clip(p[:, 2], -h, h)
@@ -196,8 +199,11 @@ def shell(inner: float) -> Solid:
 def dish(thickness: float) -> Solid:
     """Lower half of a `shell` with a wall of `thickness`."""
     inner = 1.0 - thickness
-    patches = (arc((0.0, 0.0), 1.0, -np.pi / 2, 0.0), line((1.0, 0.0), (inner, 0.0)),
-               arc((0.0, 0.0), inner, -np.pi / 2, 0.0, hollow=True))
+    patches = (
+        arc((0.0, 0.0), 1.0, -np.pi / 2, 0.0),
+        line((1.0, 0.0), (inner, 0.0)),
+        arc((0.0, 0.0), inner, -np.pi / 2, 0.0, hollow=True),
+    )
     whole = shell(inner)
     return Solid(patches, lambda p: np.maximum(whole.level(p), p[:, 2]))
 

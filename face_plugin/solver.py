@@ -19,6 +19,7 @@ from face_plugin.locate import Locator
 from face_plugin.meshers.delaunay import delaunay_mesh
 from face_plugin.params import ALPHAS, Params
 from face_plugin.poisson import Poisson
+from face_plugin.sculpt import Sculptable
 from face_plugin.surface import Backend, poisson_reconstruction
 
 __all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
@@ -61,7 +62,7 @@ class Surface:
     """The normals, and the points kept, that it was made from."""
 
 
-class FaCE:
+class FaCE(Sculptable):
     """The solved cage: keeps the mesh, the factorisation and the field, and answers questions about them.
 
     Parameters
@@ -124,11 +125,13 @@ class FaCE:
             self._potential = self.poisson.solve(self.mesh.vertices[self.mesh.boundary])
         # 6. The greatest strength that an external field of any direction causes.
         with self._stage("field"):
-            gradients = field.vertex_gradients(self.mesh, self._potential)
-            if params.directions == "exact":
-                self.vertex_strength = field.strength_exact(gradients)
-            else:
-                self.vertex_strength = field.strength_of_directions(gradients, field.half_icosahedron())
+            self.vertex_strength = self._strength_of(self._potential)
+
+    def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:
+        gradients = field.vertex_gradients(self.mesh, potential)
+        if self.params.directions == "exact":
+            return field.strength_exact(gradients)
+        return field.strength_of_directions(gradients, field.half_icosahedron())
 
     def _separation(self) -> NDArray[np.float64]:
         """Smallest distance between balls at each point, in the canonical frame."""

@@ -1,0 +1,177 @@
+"""Interactive refinement of a solved cage: point charges carve, cage points shield (paper sections 3.1.2 and 3.6)."""
+
+from __future__ import annotations
+
+import copy
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from face_plugin.cage import Balls
+from face_plugin.cloud import Cloud
+from face_plugin.meshers import CageMesh
+from face_plugin.params import ALPHAS, Params
+from face_plugin.poisson import Poisson
+from face_plugin.sculptfile import SculptFile
+from face_plugin.sculptor import Edit, Sculptor
+
+__all__ = ["Edit", "SculptFile", "Sculptable"]
+
+Solved = TypeVar("Solved", bound="Sculptable")
+
+# What a solved cage remembers through an edit; all else that it remembers follows from the field.
+LASTING = ("locator", "_sculptor")
+
+
+class Sculptable(ABC):
+    """The edits of a `FaCE`; its field, normals and interior follow each of them at once.
+
+    Examples
+    --------
+    >>> from face_plugin import FaCE
+    >>> from face_plugin.shapes import spherical_shell
+    >>> shell = spherical_shell(1500)
+    >>> face = FaCE(shell.points)
+    >>> before = ((face.normals() * shell.normals).sum(axis=1) > 0).mean()
+    >>> edit, = face.add_charges([[0.0, 0.0, 0.0]])  # the cavity is empty space
+    >>> after = ((face.normals() * shell.normals).sum(axis=1) > 0).mean()
+    >>> bool(before < 0.9 < 0.99 < after)
+    True
+    """
+
+    params: Params
+    cloud: Cloud
+    balls: Balls
+    mesh: CageMesh
+    poisson: Poisson
+    vertex_strength: NDArray[np.float64]
+    _potential: NDArray[np.float64]
+
+    def add_charges(self, positions: ArrayLike, *, alpha: float | None = None) -> tuple[Edit, ...]:
+        """Carve: put a point charge at the vertex of the mesh nearest to each position.
+
+        All charges make one more scenario: u = M there, with M five times the largest value on the box, 0 on the box,
+        and a floating cage (paper section 3.1.2). Its field strength joins E_max by the maximum. Space that a
+        charge lights up counts as outside; a neutral cage shields what is inside from it.
+
+        Parameters
+        ----------
+        positions : (k, 3) array_like of float, in the coordinates of the input
+        alpha : float, optional
+            The proxy is the isosurface of E_max at this value, by default that of the settings. A charge near
+            the proxy goes to a vertex outside it. One that is put deep inside stays there: this is how a closed
+            cavity is told from a body.
+
+        Returns
+        -------
+        tuple of Edit
+            One a position; ``edit.places`` says where it went.
+
+        Raises
+        ------
+        ValueError
+            A position is not finite, inside a ball, or on or outside the box. No edit is made then.
+        """
+        level = self.params.alpha if alpha is None else alpha
+        edits = self._sculptor.add_charges(
+            positions, level if isinstance(level, (int, float)) else ALPHAS.get(level, ALPHAS["dense"])
+        )
+        self._follow()
+        return edits
+
+    def add_cage_points(self, positions: ArrayLike, radius: ArrayLike | None = None) -> tuple[Edit, ...]:
+        """Shield: let the vertices of the mesh near each position join the conductor (paper section 3.6).
+
+        Parameters
+        ----------
+        positions : (k, 3) array_like of float, in the coordinates of the input
+        radius : float or (k,) array_like of float, optional
+            How far they reach, in the unit of the input; by default 0.9 x the distance to the nearest input point, and
+            where this reaches no vertex, to the nearest one.
+
+        Returns
+        -------
+        tuple of Edit
+            One a position; ``edit.places`` are the vertices that joined.
+
+        Raises
+        ------
+        ValueError
+            As `add_charges`; or a radius is not positive or reaches no vertex, a charge lies within it, or too many
+            vertices would join. No edit is made then.
+        """
+        edits = self._sculptor.add_cage_points(positions, radius)
+        self._follow()
+        return edits
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """The edits in the order in which they were made."""
+        return tuple(self._sculptor.edits.values()) if "_sculptor" in self.__dict__ else ()
+
+    def remove_edits(self, edits: Iterable[Edit | int]) -> None:
+        """Take edits back, given as such or by their numbers.
+
+        Raises
+        ------
+        ValueError
+            One of them is not, or no longer, there. None is removed then.
+        """
+        self._sculptor.remove(edit if isinstance(edit, int) else edit.number for edit in edits)
+        self._follow()
+
+    def clear_edits(self) -> None:
+        """Take all edits back; the field is then bit by bit what it was before the first."""
+        self.remove_edits(self.edits)
+
+    def sculpted(self: Solved, sculpt: SculptFile | str | os.PathLike[str]) -> Solved:
+        """Return a copy with further edits, from a file or as one holds them; `self` stays as it is.
+
+        Raises
+        ------
+        ValueError
+            The file is not a sculpt, or an edit is refused.
+
+        Examples
+        --------
+        >>> from face_plugin import FaCE
+        >>> from face_plugin.shapes import spherical_shell
+        >>> face = FaCE(spherical_shell(500).points)
+        >>> len(face.sculpted(SculptFile(charges=((0.0, 0.0, 0.0),))).edits), len(face.edits)
+        (1, 0)
+        """
+        if not isinstance(sculpt, SculptFile):
+            sculpt = SculptFile.load(sculpt)
+        twin = copy.copy(self)
+        twin.__dict__["_sculptor"] = self._sculptor.copy()
+        # Cage points first: a charge is not to be put where they grow to.
+        given = [point for point in sculpt.cage_points if point.radius is not None]
+        derived = [point.position for point in sculpt.cage_points if point.radius is None]
+        if given:
+            twin.add_cage_points([p.position for p in given], [p.radius for p in given])
+        if derived:
+            twin.add_cage_points(derived)
+        if sculpt.charges:
+            twin.add_charges(sculpt.charges)
+        return twin
+
+    @cached_property
+    def _sculptor(self) -> Sculptor:
+        return Sculptor(self.mesh, self.poisson, self.balls, self.cloud, self._potential, self._strength_of)
+
+    @abstractmethod
+    def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:
+        """E_max (m,) over all external fields, from the potentials (m, 3) of the basis."""
+
+    def _follow(self) -> None:
+        """Take over the field with its edits, and forget what followed from the one before."""
+        self._potential, self.vertex_strength = self._sculptor.potential, self._sculptor.strength
+        for kind in type(self).__mro__:
+            for name, member in vars(kind).items():
+                if isinstance(member, cached_property) and name not in LASTING:
+                    self.__dict__.pop(name, None)

@@ -53,7 +53,7 @@ def read_sketch(path: str | os.PathLike[str], *, width: float | None = None) -> 
 
     Examples
     --------
-    >>> import tempfile
+    >>> import tempfile, numpy as np
     >>> from face_plugin.io import write_mesh
     >>> path = tempfile.mkdtemp() + "/ribbon.obj"
     >>> write_mesh(path, np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
@@ -151,6 +151,7 @@ def write_normals(path: str | os.PathLike[str], sketch: Sketch, normals: NDArray
     Examples
     --------
     >>> import tempfile
+    >>> from face_plugin.ribbons import teapot_sketch
     >>> teapot = teapot_sketch()
     >>> write_normals(tempfile.mkdtemp() + "/teapot.ply", teapot, teapot.normals)
     """

@@ -120,6 +120,7 @@ def normals_at_vertices(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from face_plugin.ribbons import teapot_sketch
     >>> sketch = teapot_sketch()
     >>> samples = sample(sketch, 500)

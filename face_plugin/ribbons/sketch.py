@@ -78,6 +78,8 @@ class Sketch:
 
         Examples
         --------
+        >>> import numpy as np
+        >>> from face_plugin.ribbons import teapot_sketch
         >>> teapot = teapot_sketch()
         >>> teapot.select(np.arange(3)).stroke_count
         3
@@ -246,6 +248,7 @@ def sparsify(sketch: Sketch, keep: float | Literal["alternate"] = "alternate") -
 
     Examples
     --------
+    >>> from face_plugin.ribbons import teapot_sketch
     >>> teapot = teapot_sketch()
     >>> 0.4 < sparsify(teapot).stroke_count / teapot.stroke_count < 0.65
     True

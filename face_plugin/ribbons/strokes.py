@@ -62,6 +62,7 @@ def ribbons(strokes: Sequence[Stroke], problems: Sequence[str] = ()) -> Sketch:
 
     Examples
     --------
+    >>> import numpy as np
     >>> line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
     >>> sketch = ribbons([Stroke(line, np.tile([0.0, 0, 1], (3, 1)), np.full(3, 0.5))])
     >>> float(sketch.areas.sum())

@@ -1,0 +1,93 @@
+"""PyMeshLab: filters with MeshLab's naming and conventions, in Python and in filter scripts.
+
+As functions, or after `register` as methods of every ``MeshSet`` and by name::
+
+    from face_plugin.adapters import pymeshlab as face
+
+    face.compute_normal_by_faraday_cage(ms, cage_spacing=pymeshlab.PercentageValue(1))
+
+    face.register()
+    ms.compute_selection_by_faraday_interior(alpha=0.05)
+    ms.apply_filter("generate_surface_reconstruction_faraday", depth=9)
+
+Every filter works on the current layer, is recorded in the MeshSet's filter script, and takes the settings
+of `face_plugin.Params` by their own names: numbers as numbers, choices as their name or index, lengths
+(``cage_spacing``) as ``PercentageValue`` of the layer's diagonal or ``PureValue``. An ``alpha`` or
+``cage_spacing`` of 0, the default, means automatic. Wrong parameters raise what PyMeshLab raises for its
+own filters.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from face_plugin.adapters._meshlab_filters import apply_by_name
+from face_plugin.adapters._meshlab_run import register, run_filter_script, unregister
+
+__all__ = [
+    "compute_normal_by_faraday_cage",
+    "compute_scalar_by_faraday_strength",
+    "compute_selection_by_faraday_interior",
+    "generate_surface_reconstruction_faraday",
+    "register",
+    "run_filter_script",
+    "unregister",
+]
+
+def compute_normal_by_faraday_cage(ms: Any, **parameters: Any) -> None:
+    """Give the vertices of the current layer outward unit normals.
+
+    Parameters
+    ----------
+    ms : pymeshlab.MeshSet
+    onselected : bool
+        Change the normals of the selected vertices only; all of them conduct.
+    alpha, cage_spacing, ...
+        Settings of `face_plugin.Params`.
+    """
+    apply_by_name(ms, "compute_normal_by_faraday_cage", parameters)
+
+
+def compute_selection_by_faraday_interior(ms: Any, **parameters: Any) -> None:
+    """Select the vertices inside the object and no others.
+
+    MeshLab's own ``meshing_remove_selected_vertices`` deletes them.
+
+    Parameters
+    ----------
+    ms : pymeshlab.MeshSet
+    alpha, cage_spacing, ...
+        Settings of `face_plugin.Params`.
+    """
+    apply_by_name(ms, "compute_selection_by_faraday_interior", parameters)
+
+
+def compute_scalar_by_faraday_strength(ms: Any, **parameters: Any) -> None:
+    """Make the field strength at the vertices their scalar: 1 in unshielded space, near 0 deep inside.
+
+    Parameters
+    ----------
+    ms : pymeshlab.MeshSet
+    onselected : bool
+        Change the scalars of the selected vertices only.
+    cage_spacing, ...
+        Settings of `face_plugin.Params`.
+    """
+    apply_by_name(ms, "compute_scalar_by_faraday_strength", parameters)
+
+
+def generate_surface_reconstruction_faraday(ms: Any, **parameters: Any) -> None:
+    """Reconstruct a surface from the vertices of the current layer, as a new layer, which becomes current.
+
+    As with MeshLab's Poisson reconstruction, the new layer has the transform of the old one applied.
+    Normals of the old layer are neither used nor changed.
+
+    Parameters
+    ----------
+    ms : pymeshlab.MeshSet
+    depth, screened, filter_interior
+        As in `face_plugin.reconstruct`.
+    alpha, cage_spacing, ...
+        Settings of `face_plugin.Params`.
+    """
+    apply_by_name(ms, "generate_surface_reconstruction_faraday", parameters)

@@ -1,0 +1,70 @@
+"""trimesh: `PointCloud` and `Trimesh` (its vertices) wherever an array of points would do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin import solver
+from face_plugin.errors import require
+from face_plugin.params import Params
+
+__all__ = ["estimate_normals", "points_of", "reconstruct"]
+
+
+def points_of(geometry: Any) -> NDArray[Any]:
+    """Return the points of a `PointCloud`, the vertices of a `Trimesh`, or an array as it is.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> points_of(trimesh.creation.box()).shape
+    (8, 3)
+    """
+    return np.asarray(getattr(geometry, "vertices", geometry))
+
+
+def estimate_normals(geometry: Any, params: Params | None = None, **options: Any) -> solver.Result:
+    """`face_plugin.estimate_normals` of a geometry, which stays as it is.
+
+    Parameters
+    ----------
+    geometry : trimesh.PointCloud, trimesh.Trimesh or (n, 3) array_like
+    params : Params, optional
+    **options
+        As in `face_plugin.estimate_normals`.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from face_plugin.shapes import sphere
+    >>> estimate_normals(trimesh.PointCloud(sphere(300).points)).normals.shape
+    (300, 3)
+    """
+    return solver.estimate_normals(points_of(geometry), params, **options)
+
+
+def reconstruct(geometry: Any, params: Params | None = None, **options: Any) -> Any:
+    """`face_plugin.reconstruct` of a geometry, as a new `Trimesh`.
+
+    Parameters
+    ----------
+    geometry : trimesh.PointCloud, trimesh.Trimesh or (n, 3) array_like
+    params : Params, optional
+    **options
+        As in `face_plugin.reconstruct`.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        With the vertices as they were reconstructed: none are merged or dropped. The attribute
+        ``densities`` of its ``vertex_attributes`` is there where the host that reconstructs gives it.
+    """
+    trimesh = require("trimesh", extra="trimesh")
+    surface = solver.reconstruct(points_of(geometry), params, **options)
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    if surface.densities is not None:
+        mesh.vertex_attributes["densities"] = surface.densities
+    return mesh

@@ -1,0 +1,51 @@
+"""The interior test as a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from face_plugin.filters.base import Filter
+from face_plugin.filters.pointset import PointSet
+
+from face_plugin.params import Params
+from face_plugin.solver import Progress
+
+__all__ = ["Interior"]
+
+
+@dataclass(frozen=True)
+class Interior(Filter):
+    """Keep no point that lies inside the object; the attribute ``interior`` tells which do.
+
+    Parameters
+    ----------
+    alpha : float or {"auto", "dense", "sparse"}, optional
+        Field strength below which space counts as inside, as in `Params`; another value needs no new solve.
+    params : Params, optional
+        By default those of the cage solved so far, or the package's.
+
+    Examples
+    --------
+    >>> from face_plugin.filters import PointSet
+    >>> from face_plugin.shapes import nested_box
+    >>> layer = Interior()(PointSet(nested_box(600).points))
+    >>> bool((layer.keep == ~layer.attributes["interior"]).all())
+    True
+    """
+
+    name: ClassVar[str] = "interior"
+    alpha: float | str | None = None
+    params: Params | None = None
+
+    def __post_init__(self) -> None:
+        if self.alpha is not None:
+            # Params is the judge of what an alpha may be.
+            options: dict[str, Any] = {"alpha": self.alpha}
+            Params(**options)
+
+    def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
+        """Return `layer` with the interior points out of ``keep``; normals stay as they are."""
+        cage = layer.solved(self.params, progress)
+        inside = layer.scatter(cage.interior(self.alpha))
+        return layer.replace(keep=layer.keep & ~inside, attributes={**layer.attributes, "interior": inside})

@@ -1,0 +1,61 @@
+"""Charges and cage points from a file as a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from face_plugin.filters.base import Filter
+from face_plugin.filters.pointset import PointSet
+
+from face_plugin.params import Params
+from face_plugin.solver import Progress
+
+__all__ = ["Sculpt"]
+
+
+@dataclass(frozen=True)
+class Sculpt(Filter):
+    """Apply a sculpt file to the cage, for the normals and the interior test that follow.
+
+    Parameters
+    ----------
+    file : str
+        A JSON file of `face_plugin.sculpt.SculptFile`; in a chain's file, relative to its folder.
+    params : Params, optional
+        By default those of the cage solved so far, or the package's. A later step with other ones solves
+        anew and has no edits.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from face_plugin.filters import Chain, Normals, PointSet
+    >>> from face_plugin.sculpt import SculptFile
+    >>> from face_plugin.shapes import spherical_shell
+    >>> path = tempfile.mkdtemp() + "/cavity.json"
+    >>> SculptFile(charges=((0.0, 0.0, 0.0),)).save(path)
+    >>> shell = spherical_shell(1500)
+    >>> layer = Chain([Sculpt(path), Normals()])(PointSet(shell.points))
+    >>> bool(((layer.normals * shell.normals).sum(axis=1) > 0).mean() > 0.99)
+    True
+    """
+
+    name: ClassVar[str] = "sculpt"
+    file: str
+    params: Params | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.file, str) or not self.file:
+            raise ValueError(f"file must be the path of a sculpt file, found {self.file!r}")
+
+    def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
+        """Return `layer` with the sculpted cage; the one that it had stays as it was.
+
+        Raises
+        ------
+        ValueError
+            The file is not a sculpt, or an edit is refused.
+        OSError
+            The file cannot be read.
+        """
+        return layer.replace(cage=layer.solved(self.params, progress).sculpted(self.file))

@@ -1,0 +1,67 @@
+"""Surface reconstruction as a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from face_plugin.filters.base import Filter
+from face_plugin.filters.pointset import Mesh, PointSet
+
+from face_plugin.solver import Progress
+from face_plugin.surface import Backend, poisson_reconstruction
+
+__all__ = ["Surface"]
+
+
+@dataclass(frozen=True)
+class Surface(Filter):
+    """Reconstruct the surface of the kept points from their normals, by a host's Poisson reconstruction.
+
+    Parameters
+    ----------
+    depth, screened, backend, trim
+        As in `face_plugin.reconstruct`.
+
+    Examples
+    --------
+    >>> from face_plugin.filters import PointSet
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(300)
+    >>> Surface(depth=4)(PointSet(ball.points, ball.normals)).surface.faces.shape[1]
+    3
+    """
+
+    name: ClassVar[str] = "surface"
+    depth: int = 8
+    screened: bool = True
+    backend: Backend | None = None
+    trim: float = 0.0
+
+    def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
+        """Return `layer` with its ``surface``.
+
+        Raises
+        ------
+        ValueError
+            The points have no normals, or none are kept.
+        MissingDependencyError
+            No host is installed.
+        """
+        if layer.normals is None:
+            raise ValueError("a surface needs normals, and the points have none: put a 'normals' step first")
+        if not layer.keep.any():
+            raise ValueError(f"a surface needs points, and none of the {len(layer)} are kept")
+        if progress is not None:
+            progress("surface", 0.0)
+        vertices, faces, densities = poisson_reconstruction(
+            layer.points[layer.keep],
+            layer.normals[layer.keep],
+            depth=self.depth,
+            screened=self.screened,
+            backend=self.backend,
+            trim=self.trim,
+        )
+        if progress is not None:
+            progress("surface", 1.0)
+        return layer.replace(surface=Mesh(vertices, faces, densities))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-__all__ = ["Balls", "build_balls", "local_spacing", "thin"]
+__all__ = ["Balls", "build_balls", "local_spacing", "separation", "thin"]
 
 Solid = Literal["octahedron", "icosahedron"]
 
@@ -53,6 +53,27 @@ def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[n
     k = min(neighbours, len(points) - 1)
     distance, _ = cKDTree(points).query(points, k=k + 1, workers=-1)
     return np.asarray(distance[:, 1:].mean(axis=1))
+
+
+def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArray[np.float64]:
+    """Smallest distance (n,) between balls at each point (n, 3), in the points' unit.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    cage_spacing : float or None
+        The same for all, in the points' unit; None = half the distance to the 8th neighbour, which removes
+        near-duplicates and keeps even samplings.
+
+    Examples
+    --------
+    >>> separation(np.eye(3), 0.1)
+    array([0.1, 0.1, 0.1])
+    """
+    if cage_spacing is not None:
+        return np.full(len(points), cage_spacing)
+    eighth = cKDTree(points).query(points, k=[min(9, len(points))], workers=-1)[0][:, 0]
+    return np.asarray(0.5 * eighth)
 
 
 def thin(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Cloud", "Frame", "as_points", "prepare"]
+__all__ = ["Cloud", "Frame", "as_points", "morton_distinct", "prepare"]
 
 log = logging.getLogger(__name__)
 
@@ -157,7 +157,7 @@ def prepare(points: ArrayLike) -> Cloud:
     if extent[1] <= FLAT_TOLERANCE:
         raise ValueError("points must not all lie on one line: a line has no normal")
     work = work @ axes.T
-    order, first = _distinct(work)
+    order, first = morton_distinct(work)
     distinct = work[order[first]]
     if len(distinct) < MINIMUM_POINTS:
         raise ValueError(
@@ -189,7 +189,7 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     return axes, extent
 
 
-def _distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def morton_distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Morton order of points of unit size, and which of the sorted ones is not its predecessor's twin."""
     lower = points.min(axis=0)
     cell = np.floor((points - lower) * (2**MORTON_BITS - 1) / np.ptp(points, axis=0).max()).astype(np.uint64)

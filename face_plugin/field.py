@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from face_plugin.meshers import CageMesh
 
-__all__ = ["half_icosahedron", "strength_exact", "strength_of_directions", "vertex_gradients"]
+__all__ = ["half_icosahedron", "strength", "strength_exact", "strength_of_directions", "vertex_gradients"]
 
 
 def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -144,3 +144,11 @@ def strength_of_directions(
     for v in directions:
         np.maximum(out, np.linalg.norm(gradients @ v, axis=1), out=out)
     return out
+
+
+def strength(mesh: CageMesh, potential: NDArray[np.float64], directions: str) -> NDArray[np.float64]:
+    """E_max (m,) at the vertices from the three basis potentials (m, 3); `directions` as in `Params`."""
+    gradients = vertex_gradients(mesh, potential)
+    if directions == "exact":
+        return strength_exact(gradients)
+    return strength_of_directions(gradients, half_icosahedron())

@@ -105,7 +105,8 @@ class FaCE(Sculptable):
             self.frame = self.cloud.frame
         # 2. A conducting ball at each point, near-duplicates left out.
         with self._stage("cage"):
-            rows = cage.thin(self.cloud.points, self._separation(), params.seed)
+            spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
+            rows = cage.thin(self.cloud.points, cage.separation(self.cloud.points, spacing), params.seed)
             self.balls = cage.build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
             )
@@ -128,18 +129,7 @@ class FaCE(Sculptable):
             self.vertex_strength = self._strength_of(self._potential)
 
     def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:
-        gradients = field.vertex_gradients(self.mesh, potential)
-        if self.params.directions == "exact":
-            return field.strength_exact(gradients)
-        return field.strength_of_directions(gradients, field.half_icosahedron())
-
-    def _separation(self) -> NDArray[np.float64]:
-        """Smallest distance between balls at each point, in the canonical frame."""
-        points = self.cloud.points
-        if self.params.cage_spacing is not None:
-            return np.full(len(points), self.params.cage_spacing / self.frame.scale)
-        eighth = cKDTree(points).query(points, k=[min(9, len(points))], workers=-1)[0][:, 0]
-        return np.asarray(0.5 * eighth)
+        return field.strength(self.mesh, potential, self.params.directions)
 
     @cached_property
     def _normals(self) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """Point clouds and meshes on disk: PLY, OBJ, XYZ/TXT/CSV, NPY/NPZ, LAS/LAZ in; the same, STL and OFF out.
 
-Every file is written under another name in the same folder and then renamed: what stands under the wanted name
-is always whole.
+Every file is written under another name in the same folder and then renamed: what stands under the wanted
+name is always whole.
 """
 
 from __future__ import annotations
@@ -16,7 +16,15 @@ import numpy as np
 
 from face_plugin.io.cloudfile import Array, CloudFile, replacing
 
-__all__ = ["CLOUD_SUFFIXES", "MESH_SUFFIXES", "CloudFile", "check_output", "read_cloud", "write_cloud", "write_mesh"]
+__all__ = [
+    "CLOUD_SUFFIXES",
+    "MESH_SUFFIXES",
+    "CloudFile",
+    "check_output",
+    "read_cloud",
+    "write_cloud",
+    "write_mesh",
+]
 
 _TEXT = (".xyz", ".xyzn", ".txt", ".csv", ".asc", ".pts")
 _READERS = {
@@ -80,8 +88,8 @@ def read_cloud(path: str | os.PathLike[str]) -> CloudFile:
     Parameters
     ----------
     path : path
-        PLY (ascii or binary of either byte order), OBJ, XYZ/XYZN/TXT/CSV/ASC/PTS (any delimiter, with or without
-        column names), NPY, NPZ, or LAS/LAZ (extra ``las``).
+        PLY (ascii or binary of either byte order), OBJ, XYZ/XYZN/TXT/CSV/ASC/PTS (any delimiter, with or
+        without column names), NPY, NPZ, or LAS/LAZ (extra ``las``).
 
     Returns
     -------
@@ -121,8 +129,8 @@ def write_cloud(
 ) -> None:
     """Write a cloud, with new normals, to a file of the same or another format.
 
-    Within one format all that was read is kept: other properties and elements, comments, byte order, delimiter.
-    Across formats points, normals and per-point attributes are carried over.
+    Within one format all that was read is kept: other properties and elements, comments, byte order,
+    delimiter. Across formats points, normals and per-point attributes are carried over.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""PLY point clouds through plyfile: ascii and binary, both byte orders, other properties and elements kept."""
+"""PLY point clouds through plyfile: ascii and binary of both byte orders, everything else kept."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -12,9 +13,11 @@ from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError, PlyProp
 
 from face_plugin.io.cloudfile import Array, CloudFile, columns, format_column, interleave, malformed
 
+log = logging.getLogger(__name__)
+
 _POINT = ("x", "y", "z")
 _NORMAL = ("nx", "ny", "nz")
-# plyfile reads elements with lists row by row unless it knows the length of the lists; faces are mostly triangles.
+# plyfile reads lists row by row unless it knows their length; faces are mostly triangles.
 _TRIANGLES = {"face": {"vertex_indices": 3, "vertex_index": 3}}
 _EDGE = ("vertex1", "vertex2")
 
@@ -75,7 +78,9 @@ def write(
             properties.update({n: v for n, v in _named(normals, _NORMAL).items() if n not in old})
     if normals is not None:
         # A file that has normals keeps its own type for them.
-        properties.update({n: v.astype(old[n].dtype) for n, v in _named(normals, _NORMAL).items() if n in old})
+        properties.update(
+            {n: v.astype(old[n].dtype) for n, v in _named(normals, _NORMAL).items() if n in old}
+        )
     properties.update(extra)
     if keep is not None:
         properties = {name: values[keep] for name, values in properties.items()}
@@ -99,12 +104,14 @@ def element(
     lists: Mapping[str, Any] | None = None,
     comments: list[str] | None = None,
 ) -> Any:
-    """Make a `PlyElement`: 2-d arrays become lists, wide integers and booleans the nearest type that PLY has."""
+    """Make a `PlyElement`: 2-d arrays become lists, other types the nearest that PLY has."""
     fields, properties, used = [], [], {}
     for key, column in values.items():
-        column = _ply_type(key, column)
-        if column is None:
+        typed = _ply_type(column)
+        if typed is None:
+            log.warning("%s is text, which PLY cannot hold: left out", key)
             continue
+        column = typed
         label = "_".join(key.split()).encode("ascii", "replace").decode()
         used[label] = column
         if lists and key in lists:
@@ -123,7 +130,7 @@ def element(
     return made
 
 
-def _ply_type(name: str, values: Array) -> Array | None:
+def _ply_type(values: Array) -> Array | None:
     """Return the values in a type that PLY has, or None for text, which it cannot hold."""
     kind, size = values.dtype.kind, values.dtype.itemsize
     if kind == "O" or (kind in "iu" and size <= 4) or (kind == "f" and size in (4, 8)):
@@ -164,7 +171,7 @@ def _kept(old: Any, keep: Array | None) -> Any:
 
 
 def write_elements(path: Path, data: Any) -> None:
-    """Write the header through plyfile, and the rows in one piece (plyfile writes lists and ascii row by row)."""
+    """Write the header through plyfile, and the rows in one piece (plyfile goes row by row)."""
     with open(path, "wb") as stream:
         stream.write(data.header.encode("ascii", "replace") + b"\n")
         for part in data.elements:

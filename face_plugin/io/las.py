@@ -1,0 +1,89 @@
+"""LAS and LAZ point clouds through laspy (extra ``las``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from face_plugin.errors import require
+from face_plugin.io.cloudfile import Array, CloudFile, columns, malformed
+
+# The names under which PDAL and CloudCompare keep normals in extra bytes.
+_NORMAL = ("NormalX", "NormalY", "NormalZ")
+
+
+def read(path: Path) -> CloudFile:
+    """Read a LAS or LAZ file; see `face_plugin.io.read_cloud`."""
+    laspy = require("laspy", extra="las")
+    try:
+        las = laspy.read(str(path))
+        points = np.ascontiguousarray(las.xyz)
+    except OSError:
+        raise
+    except Exception as error:
+        # laspy and its LAZ back ends raise many types on a broken file (their own, ValueError, struct.error,
+        # Rust's): all of them mean that this is not a file of points.
+        raise malformed(path, path.suffix[1:].upper(), error) from error
+    names = list(las.point_format.dimension_names)
+    has_normals = all(name in names for name in _NORMAL)
+    skip = {"X", "Y", "Z", *(_NORMAL if has_normals else ())}
+    return CloudFile(
+        points=points,
+        normals=np.stack([np.asarray(las[name]) for name in _NORMAL], axis=1) if has_normals else None,
+        attributes={name: np.asarray(las[name]) for name in names if name not in skip},
+        suffix=path.suffix.lower(),
+        source=las,
+    )
+
+
+def write(
+    path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None
+) -> None:
+    """Write a LAS or LAZ file; see `face_plugin.io.write_cloud`."""
+    laspy = require("laspy", extra="las")
+    points, normals, attributes = columns(cloud, normals, extra, keep)
+    if isinstance(cloud.source, laspy.LasData):
+        # Indexing copies header and points.
+        las = cloud.source[np.ones(len(cloud), dtype=bool) if keep is None else keep]
+        new = {name: values for name, values in attributes.items() if name in extra}
+    else:
+        las = _fresh(laspy, points)
+        new = attributes
+    if normals is not None:
+        new = {**new, **{name: normals[:, k].astype(np.float32) for k, name in enumerate(_NORMAL)}}
+    present = set(las.point_format.dimension_names)
+    added = [
+        laspy.ExtraBytesParams(name=name[:32], type=np.uint8 if values.dtype.kind == "b" else values.dtype)
+        for name, values in new.items()
+        if name not in present and values.dtype.kind in "fiub"
+    ]
+    if added:
+        las.add_extra_dims(added)
+    present = set(las.point_format.dimension_names)
+    for name, values in new.items():
+        if name[:32] in present:
+            las[name[:32]] = _colour(values) if name in ("red", "green", "blue") else values
+    las.write(str(path))
+
+
+def _colour(values: Array) -> Array:
+    """Colours in LAS have 16 bits; those of 8 bits are spread over them."""
+    return values.astype(np.uint16) * 257 if values.dtype == np.uint8 else values
+
+
+def _fresh(laspy: ModuleType, points: Array) -> Any:
+    """Make a LAS of point format 7 whose integer grid is as fine as the extent of the points allows."""
+    low, extent = np.zeros(3), np.ones(3)
+    if len(points):
+        low, extent = points.min(axis=0).astype(np.float64), np.ptp(points, axis=0).astype(np.float64)
+    header = laspy.LasHeader(point_format=7, version="1.4")
+    header.offsets = low
+    # 2e9 steps fit 32 bits; a power of ten keeps decimal coordinates readable.
+    header.scales = 10.0 ** np.ceil(np.log10(np.maximum(extent, 1e-300) / 2e9))
+    las = laspy.LasData(header)
+    las.xyz = points
+    return las

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 __all__ = ["Cloud", "Frame", "as_points", "morton_distinct", "prepare"]
 
@@ -143,34 +146,55 @@ def prepare(points: ArrayLike) -> Cloud:
     array = as_points(points)
     if len(array) < MINIMUM_POINTS:
         raise ValueError(f"points must hold at least {MINIMUM_POINTS} points, found {len(array)}")
-    work = array.astype(np.float64)
-    with np.errstate(over="ignore"):
-        lower, upper = work.min(axis=0), work.max(axis=0)
-        diagonal = float(np.linalg.norm(upper - lower))
-    if not np.isfinite(diagonal):
-        raise ValueError("points must span a finite length, found coordinates whose difference overflows")
-    if diagonal == 0.0 or not np.isfinite(1.0 / diagonal):
-        raise ValueError(f"points must be distinct, found {len(work)} points at one place")
-    origin = 0.5 * lower + 0.5 * upper
-    work = (work - origin) / diagonal
+    origin, scale = _extent(array)
+    # Repeated points go first, and the rest into an order of their own, so that neither they nor the order of the
+    # input can change a sum.
+    sort, first = _sorted_distinct(array.astype(np.float64))
+    work = (array[sort[first]].astype(np.float64) - origin) / scale
     axes, extent = _axes(work)
-    if extent[1] <= FLAT_TOLERANCE:
+    # Rounding to the input's own precision does not give a line or a plane a thickness.
+    rounding = float(np.finfo(array.dtype).eps) * float(np.abs(array).max()) / scale
+    flat_tolerance = max(FLAT_TOLERANCE, 4 * rounding)
+    if extent[1] <= flat_tolerance:
         raise ValueError("points must not all lie on one line: a line has no normal")
     work = work @ axes.T
-    order, first = morton_distinct(work)
-    distinct = work[order[first]]
+    order, leads = morton_distinct(work)
+    distinct = work[order[leads]]
     if len(distinct) < MINIMUM_POINTS:
         raise ValueError(
-            f"points must hold at least {MINIMUM_POINTS} distinct points, found {len(distinct)} among {len(work)}"
+            f"points must hold at least {MINIMUM_POINTS} distinct points, found {len(distinct)} among {len(array)}"
         )
-    rows = np.empty(len(work), dtype=np.intp)
-    rows[order] = np.cumsum(first) - 1
-    if len(distinct) < len(work):
-        log.info("%d of %d points coincide with another one", len(work) - len(distinct), len(work))
-    flat = bool(extent[2] <= FLAT_TOLERANCE)
+    place = np.empty(len(work), dtype=np.intp)
+    place[order] = np.cumsum(leads) - 1
+    rows = np.empty(len(array), dtype=np.intp)
+    rows[sort] = place[np.cumsum(first) - 1]
+    if len(distinct) < len(array):
+        log.info("%d of %d points coincide with another one", len(array) - len(distinct), len(array))
+    flat = bool(extent[2] <= flat_tolerance)
     if flat:
         log.warning("all points lie in one plane: the side that their normals point to is arbitrary")
-    return Cloud(distinct, rows, Frame(origin, axes, diagonal), array.dtype, flat)
+    return Cloud(distinct, rows, Frame(origin, axes, scale), array.dtype, flat)
+
+
+def _extent(array: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
+    """Centre (3,) and diagonal of the bounding box, without overflow or underflow on the way."""
+    lower, upper = array.min(axis=0).astype(np.float64), array.max(axis=0).astype(np.float64)
+    with np.errstate(over="ignore"):
+        side = upper - lower
+        longest = float(side.max())
+        if longest == 0.0:
+            raise ValueError(f"points must be distinct, found {len(array)} points at one place")
+        diagonal = longest * float(np.linalg.norm(side / longest)) if np.isfinite(longest) else np.inf
+    if not np.isfinite(diagonal):
+        raise ValueError("points must span a finite length, found coordinates whose difference overflows")
+    return 0.5 * lower + 0.5 * upper, diagonal
+
+
+def _sorted_distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Lexical order of points, and which of the sorted ones differs from its predecessor."""
+    order = np.lexsort(points.T)
+    differs = (np.diff(points[order], axis=0) != 0).any(axis=1)
+    return order, np.concatenate([[True], differs])
 
 
 def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -185,21 +209,41 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     skewness = ((centred @ axes.T) ** 3).mean(axis=0)
     axes = axes * np.where(skewness < 0, -1.0, 1.0)[:, None]
     if np.linalg.det(axes) < 0:
-        axes[np.argmin(np.abs(skewness) / np.maximum(variance, 1e-300) ** 1.5)] *= -1
+        axes[np.argmin(np.abs(skewness) / np.maximum(variance, 1e-30) ** 1.5)] *= -1
     return axes, extent
 
 
 def morton_distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Morton order of points of unit size, and which of the sorted ones is not its predecessor's twin."""
+    """Morton order of points of unit size, twins next to each other, and which of the sorted ones leads its twins.
+
+    Points nearer than `MERGE_TOLERANCE` are twins, and so are the twins of twins.
+
+    Examples
+    --------
+    >>> order, leads = morton_distinct(np.array([[1.0, 1, 1], [0, 0, 0], [1, 1, 1 + 1e-12]]))
+    >>> order, leads
+    (array([1, 0, 2]), array([ True,  True, False]))
+    """
     lower = points.min(axis=0)
     cell = np.floor((points - lower) * (2**MORTON_BITS - 1) / np.ptp(points, axis=0).max()).astype(np.uint64)
     code = np.zeros(len(points), dtype=np.uint64)
     for axis in range(3):
         code |= _spread_bits(cell[:, axis]) << np.uint64(axis)
     order = np.lexsort((points[:, 2], points[:, 1], points[:, 0], code))
-    sorted_points = points[order]
-    step = np.abs(np.diff(sorted_points, axis=0)).max(axis=1)
-    return order, np.concatenate([[True], step > MERGE_TOLERANCE])
+    step = np.abs(np.diff(points[order], axis=0)).max(axis=1)
+    leads = np.concatenate([[True], step > MERGE_TOLERANCE])
+    # Twins on two sides of a border between cells are far apart in the order.
+    heads = points[order[leads]]
+    pairs = cKDTree(heads).query_pairs(MERGE_TOLERANCE, output_type="ndarray")
+    if len(pairs) == 0:
+        return order, leads
+    link = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(heads), len(heads)))
+    group = connected_components(link, directed=False)[1]
+    # Groups are numbered by their first member, so a stable sort keeps the Morton order.
+    _, first, group = np.unique(group, return_index=True, return_inverse=True)
+    rank = first[group][np.cumsum(leads) - 1]
+    moved = np.argsort(rank, kind="stable")
+    return order[moved], np.concatenate([[True], np.diff(rank[moved]) > 0])
 
 
 def _spread_bits(x: NDArray[np.uint64]) -> NDArray[np.uint64]:

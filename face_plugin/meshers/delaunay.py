@@ -27,6 +27,9 @@ log = logging.getLogger(__name__)
 # A tetrahedron flatter than this (volume by cubed longest edge) is rounding: four coplanar vertices of the box, or
 # a sliver whose gradient would be noise.
 FLATTEST = 1e-9
+# Random displacement, as a fraction of the largest coordinate, that decides between the Delaunay tetrahedralisations of
+# cospherical vertices. It is gmsh's own, whose generator is the C library's: another mesh at every call.
+NUDGE = 1e-12
 
 GMSH_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1 libfontconfig1"
 _gmsh_lock = threading.Lock()
@@ -87,11 +90,17 @@ def tetrahedralize(points: NDArray[np.float64]) -> NDArray[np.int32]:
         from scipy.spatial import Delaunay
 
         return np.asarray(Delaunay(points, qhull_options="Qbb Qc Qz Q12").simplices, dtype=np.int32)
+    reach = float(np.linalg.norm(np.abs(points).max(axis=0)))
+    nudge = np.random.default_rng(0).uniform(0.0, NUDGE * reach, points.shape)
     with _gmsh_lock:
+        factor = gmsh.option.getNumber("Mesh.RandomFactor3D")
+        gmsh.option.setNumber("Mesh.RandomFactor3D", 0.0)
         try:
-            flat, steiner = gmsh.algorithm.tetrahedralize(points.ravel())
+            flat, steiner = gmsh.algorithm.tetrahedralize((points + nudge).ravel())
         except Exception as error:
             raise MeshingError(f"gmsh failed to tetrahedralise {len(points)} vertices: {error}") from error
+        finally:
+            gmsh.option.setNumber("Mesh.RandomFactor3D", factor)
     if len(steiner):
         raise MeshingError(f"gmsh added {len(steiner) // 3} vertices of its own")
     return np.asarray(flat).reshape(-1, 4).astype(np.int32) - 1

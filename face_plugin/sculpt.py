@@ -1,4 +1,4 @@
-"""Interactive refinement of a solved cage: point charges carve, cage points shield (paper sections 3.1.2 and 3.6)."""
+"""Refinement of a solved cage by hand: charges carve, cage points shield (paper sections 3.1.2 and 3.6)."""
 
 from __future__ import annotations
 
@@ -55,17 +55,17 @@ class Sculptable(ABC):
     def add_charges(self, positions: ArrayLike, *, alpha: float | None = None) -> tuple[Edit, ...]:
         """Carve: put a point charge at the vertex of the mesh nearest to each position.
 
-        All charges make one more scenario: u = M there, with M five times the largest value on the box, 0 on the box,
-        and a floating cage (paper section 3.1.2). Its field strength joins E_max by the maximum. Space that a
-        charge lights up counts as outside; a neutral cage shields what is inside from it.
+        All charges make one more scenario: u = M there, with M five times the largest value on the box, 0 on
+        the box, and a floating cage (paper section 3.1.2). Its field strength joins E_max by the maximum.
+        Space that a charge lights up counts as outside; a neutral cage shields what is inside from it.
 
         Parameters
         ----------
         positions : (k, 3) array_like of float, in the coordinates of the input
         alpha : float, optional
             The proxy is the isosurface of E_max at this value, by default that of the settings. A charge near
-            the proxy goes to a vertex outside it. One that is put deep inside stays there: this is how a closed
-            cavity is told from a body.
+            the proxy goes to a vertex outside it. One that is put deep inside stays there: this is how a
+            closed cavity is told from a body.
 
         Returns
         -------
@@ -91,8 +91,8 @@ class Sculptable(ABC):
         ----------
         positions : (k, 3) array_like of float, in the coordinates of the input
         radius : float or (k,) array_like of float, optional
-            How far they reach, in the unit of the input; by default 0.9 x the distance to the nearest input point, and
-            where this reaches no vertex, to the nearest one.
+            How far they reach, in the unit of the input; by default 0.9 x the distance to the nearest input
+            point, and where this reaches no vertex, to the nearest one.
 
         Returns
         -------
@@ -102,8 +102,8 @@ class Sculptable(ABC):
         Raises
         ------
         ValueError
-            As `add_charges`; or a radius is not positive or reaches no vertex, a charge lies within it, or too many
-            vertices would join. No edit is made then.
+            As `add_charges`; or a radius is not positive or reaches no vertex, or a charge lies within it.
+            No edit is made then.
         """
         edits = self._sculptor.add_cage_points(positions, radius)
         self._follow()
@@ -150,10 +150,10 @@ class Sculptable(ABC):
         twin = copy.copy(self)
         twin.__dict__["_sculptor"] = self._sculptor.copy()
         # Cage points first: a charge is not to be put where they grow to.
-        given = [point for point in sculpt.cage_points if point.radius is not None]
+        given = [(point.position, point.radius) for point in sculpt.cage_points if point.radius is not None]
         derived = [point.position for point in sculpt.cage_points if point.radius is None]
         if given:
-            twin.add_cage_points([p.position for p in given], [p.radius for p in given])
+            twin.add_cage_points([place for place, _ in given], [radius for _, radius in given])
         if derived:
             twin.add_cage_points(derived)
         if sculpt.charges:
@@ -162,7 +162,15 @@ class Sculptable(ABC):
 
     @cached_property
     def _sculptor(self) -> Sculptor:
-        return Sculptor(self.mesh, self.poisson, self.balls, self.cloud, self._potential, self._strength_of)
+        return Sculptor(
+            self.mesh,
+            self.poisson,
+            self.balls,
+            self.cloud,
+            self._potential,
+            self.vertex_strength,
+            self._strength_of,
+        )
 
     @abstractmethod
     def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:

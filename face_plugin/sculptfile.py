@@ -74,7 +74,8 @@ class SculptFile:
         Raises
         ------
         ValueError
-            The file is not what this module describes; the message names the file, the field and what was found.
+            The file is not what this module describes; the message names the file, the field and what was
+            found.
         OSError
             The file cannot be read.
         """
@@ -90,9 +91,8 @@ class SculptFile:
         table = _table("the file", content, required={"version"}, optional={"charges", "cage_points"})
         if isinstance(table["version"], bool) or table["version"] != VERSION:
             raise ValueError(f"version must be {VERSION}, found {table['version']!r}")
-        charges = [
-            _position(f"charges[{row}]", item) for row, item in enumerate(_list("charges", table.get("charges", [])))
-        ]
+        given = enumerate(_list("charges", table.get("charges", [])))
+        charges = [_position(f"charges[{row}]", item) for row, item in given]
         cage_points = []
         for row, item in enumerate(_list("cage_points", table.get("cage_points", []))):
             name = f"cage_points[{row}]"
@@ -117,7 +117,7 @@ class SculptFile:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Make a dictionary, unless a key occurs twice: which of the two was meant?"""
+    """Make a dictionary; a key that occurs twice leaves open which value is meant."""
     table = dict(pairs)
     if len(table) < len(pairs):
         names = [name for name, _ in pairs]

@@ -1,8 +1,8 @@
-"""What sculpting does to a solved cage: where edits go, and the field that they leave (paper sections 3.1.2 and 3.6).
+"""What sculpting does to a solved cage: where edits go, and the field with them (paper sections 3.1.2, 3.6).
 
-A point charge carves: it is one more scenario, in which the vertex of the charge has a high potential, the box is
-grounded and the cage floats; space that the charge lights up counts as outside. A cage point shields: the vertices near
-it join the conductor. Nothing is meshed or factorised again, see `face_plugin.pins`.
+A point charge carves: it is one more scenario, in which the vertex of the charge has a high potential, the
+box is grounded and the cage floats; space that the charge lights up counts as outside. A cage point shields:
+the vertices near it join the conductor. Nothing is meshed or factorised again, see `face_plugin.pins`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from face_plugin.poisson import Poisson
 
 __all__ = ["Edit", "Sculptor"]
 
+Kind = Literal["charge", "cage"]
+
 # Potential of a charge, in largest values on the box (paper section 3.1.2).
 CHARGE = 5.0
 # Reach of a cage point, as a fraction of the distance to the nearest input point (paper section 3.6).
@@ -40,12 +42,12 @@ class Edit:
 
     number: int
     """Counts the edits of one cage from 1; never used twice."""
-    kind: Literal["charge", "cage"]
+    kind: Kind
     position: NDArray[np.float64]
     """(3,) where it was asked for, in the coordinates of the input."""
     radius: float | None
-    """Reach of a cage point, in the unit of the input; None for a charge, and for a cage point that found no vertex
-    within its reach and took the nearest one."""
+    """Reach of a cage point, in the unit of the input; None for a charge, and for a cage point that found no
+    vertex within its reach and took the nearest one."""
     vertices: NDArray[np.intp]
     """(k,) vertices of the mesh: that of a charge, or those that joined the conductor."""
     places: NDArray[np.float64]
@@ -63,6 +65,8 @@ class Sculptor:
     cloud : Cloud
     potential : (m, 3) float64
         Potentials of the three basis fields without edits.
+    strength : (m,) float64
+        E_max without edits.
     strength_of : callable
         E_max (m,) of the external fields whose basis has the given potentials.
 
@@ -82,6 +86,7 @@ class Sculptor:
         balls: Balls,
         cloud: Cloud,
         potential: NDArray[np.float64],
+        strength: NDArray[np.float64],
         strength_of: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     ) -> None:
         self.mesh, self.balls, self.cloud = mesh, balls, cloud
@@ -94,26 +99,24 @@ class Sculptor:
         self._strength_of = strength_of
         self._joined = np.empty(0, dtype=np.intp)
         self.potential = potential
-        self.strength = self._external = strength_of(potential)
+        self.strength = self._external = strength
 
     def copy(self) -> Sculptor:
         """Return a sculptor with the same edits; what is added to either is not added to the other."""
-        twin = copy.copy(self)
-        twin.edits = dict(self.edits)
-        # What one of them solves for is not written into the arrays of the other: they are replaced, not changed.
-        twin._pinned = copy.copy(self._pinned)
-        return twin
+        # An edit replaces what a sculptor holds and changes none of it.
+        return copy.copy(self)
 
     def add_charges(self, positions: ArrayLike, level: float) -> tuple[Edit, ...]:
         """Put charges at the vertices nearest to positions (k, 3), outside the proxy where that is near.
 
-        The proxy is the isosurface of E_max at `level`. A charge goes to the nearest free vertex; if the proxy
-        encloses that one, to the nearest of its neighbours which it does not enclose; if it encloses these too, the
-        position was meant to be inside, as that in a closed cavity is, and the charge stays at the nearest vertex.
+        The proxy is the isosurface of E_max at `level`. A charge goes to the nearest free vertex; if the
+        proxy encloses that one, to the nearest of its neighbours which it does not enclose; if it encloses
+        these too, the position was meant to be inside, as that in a closed cavity is, and the charge stays at
+        the nearest vertex.
         """
         local = self._checked(positions)
         made = []
-        for position, at in zip(np.asarray(positions, dtype=np.float64), local, strict=True):
+        for position, at in zip(np.array(positions, dtype=np.float64), local, strict=True):
             vertex = self._snap(at, level)
             made.append(self._edit("charge", position, None, np.array([vertex])))
         return self._added(made)
@@ -124,10 +127,10 @@ class Sculptor:
         scale = self.cloud.frame.scale
         nearest = self._points.query(local)[0]
         reach = REACH * nearest if radius is None else _radii(radius, len(local)) / scale
-        held = self._of("charge")
+        held = _vertices(self.edits, "charge")
         made = []
-        for row, (position, at) in enumerate(zip(np.asarray(positions, dtype=np.float64), local, strict=True)):
-            distance = np.linalg.norm(self.mesh.vertices[self._free] - at, axis=1)
+        for row, position in enumerate(np.array(positions, dtype=np.float64)):
+            distance = np.linalg.norm(self.mesh.vertices[self._free] - local[row], axis=1)
             near = self._free[distance <= reach[row]]
             found = float(reach[row]) * scale if len(near) else None
             if found is None and radius is not None:
@@ -139,8 +142,8 @@ class Sculptor:
                 near = self._free[[np.argmin(distance)]]
             if np.isin(held, near).any():
                 raise ValueError(
-                    f"positions[{row}]: a charge lies where the conductor would grow, and a charge in a conductor "
-                    "does nothing; remove it or use a smaller radius"
+                    f"positions[{row}]: a charge lies where the conductor would grow, and would do nothing "
+                    "there; remove it or use a smaller radius"
                 )
             made.append(self._edit("cage", position, found, near))
         return self._added(made)
@@ -156,8 +159,7 @@ class Sculptor:
         numbers = set(numbers)
         if unknown := sorted(numbers - self.edits.keys()):
             raise ValueError(f"edits: there is no edit {unknown[0]}; there are {sorted(self.edits)}")
-        self.edits = {number: edit for number, edit in self.edits.items() if number not in numbers}
-        self._update()
+        self._update({number: edit for number, edit in self.edits.items() if number not in numbers})
 
     def _checked(self, positions: ArrayLike) -> NDArray[np.float64]:
         """Positions in the canonical frame; those where no edit can be are refused."""
@@ -184,7 +186,8 @@ class Sculptor:
         nearest = int(loose[np.argmin(distance)])
         if self.strength[nearest] >= level or distance.min() < SAME * self._centres.query(at)[0]:
             return nearest
-        # A neighbour is on the same side of a wall: no edge of the mesh passes between two balls of a dense cage.
+        # A neighbour is on the same side of a wall: no edge of the mesh passes between two balls of a dense
+        # cage.
         column = int(np.searchsorted(self._free, nearest))
         start, stop = self._adjacent.indptr[column : column + 2]
         near = np.intersect1d(self._free[self._adjacent.indices[start:stop]], loose)
@@ -195,7 +198,7 @@ class Sculptor:
 
     def _edit(
         self,
-        kind: Literal["charge", "cage"],
+        kind: Kind,
         position: NDArray[np.float64],
         radius: float | None,
         vertices: NDArray[np.intp],
@@ -205,24 +208,12 @@ class Sculptor:
         return Edit(self._count, kind, position, radius, vertices, places)
 
     def _added(self, made: list[Edit]) -> tuple[Edit, ...]:
-        before = self.edits
-        self.edits = before | {edit.number: edit for edit in made}
-        try:
-            self._update()
-        except ValueError:
-            # Too many vertices at once: all as it was.
-            self.edits = before
-            raise
+        self._update(self.edits | {edit.number: edit for edit in made})
         return tuple(made)
 
-    def _of(self, kind: Literal["charge", "cage"]) -> NDArray[np.intp]:
-        """Distinct vertices of all edits of a kind."""
-        vertices = [edit.vertices for edit in self.edits.values() if edit.kind == kind]
-        return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *vertices]))
-
-    def _update(self) -> None:
+    def _update(self, edits: dict[int, Edit]) -> None:
         """Solve for what changed: cage points change every scenario, charges only their own."""
-        joined, held = self._of("cage"), self._of("charge")
+        joined, held = _vertices(edits, "cage"), _vertices(edits, "charge")
         potential, external = self.potential, self._external
         if not np.array_equal(joined, self._joined):
             potential = self._pinned.solve(self._without_edits, joined=joined)
@@ -234,8 +225,9 @@ class Sculptor:
             charged = self._pinned.solve(still, joined=joined, held=held, value=CHARGE * largest)
             gradient = vertex_gradients(self.mesh, charged)[:, :, 0]
             strength = np.maximum(external, np.linalg.norm(gradient, axis=1))
-        # Everything at once, at the end: nothing has changed where a solve was refused.
-        self._joined, self.potential, self._external, self.strength = joined, potential, external, strength
+        # Everything at once, at the end: nothing has changed where a solve failed.
+        self.edits, self._joined = edits, joined
+        self.potential, self._external, self.strength = potential, external, strength
 
     @cached_property
     def _points(self) -> cKDTree:
@@ -246,11 +238,17 @@ class Sculptor:
         return cKDTree(self.balls.centres)
 
 
+def _vertices(edits: dict[int, Edit], kind: Kind) -> NDArray[np.intp]:
+    """Distinct vertices of all edits of a kind."""
+    vertices = [edit.vertices for edit in edits.values() if edit.kind == kind]
+    return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *vertices]))
+
+
 def _radii(radius: ArrayLike, count: int) -> NDArray[np.float64]:
     """Return one positive radius a position (count,)."""
     radii = np.asarray(radius, dtype=np.float64)
     if radii.shape not in ((), (count,)):
-        raise ValueError(f"radius must be a number or one for each of {count} positions, found shape {radii.shape}")
+        raise ValueError(f"radius must be one number or {count}, one a position; found shape {radii.shape}")
     if not (np.isfinite(radii) & (radii > 0)).all():
         raise ValueError(f"radius must be finite and > 0, found {radii.min() if radii.size else radii}")
     return np.broadcast_to(radii, (count,))

@@ -23,6 +23,10 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "inside": ("rays", "winding"),
 }
 
+ENGINES = ("auto", "serial", "processes", "dask")
+SMALLEST_TILE = 1000
+"""A smaller tile would consist of its halo."""
+
 
 @dataclass(frozen=True)
 class Params:
@@ -74,6 +78,17 @@ class Params:
     inside: Literal["rays", "winding"] = "rays"
     """Test of a point against the isosurface: embree rays, or the winding number."""
 
+    # Large clouds
+    tile_points: int | None = None
+    """Points of a tile, >= 1000; a cloud of no more is solved in one piece; None = tiles of 20,000 above 50,000."""
+    max_memory: float | None = None
+    """Memory that all processes together may take, in gigabytes (1e9 bytes); None = half of what is free."""
+    engine: str = "auto"
+    """Who solves tiles: "serial" = this process, "processes" = several of this machine, "dask" = Dask's workers, or
+    the address of a Dask scheduler; "auto" is "processes" where more than one fits."""
+    workers: int | None = None
+    """Tiles solved at a time, >= 1; None = as many as there are cores."""
+
     # Everything
     seed: int = 0
     """Seed of the random turns, jitters and orders; >= 0."""
@@ -93,8 +108,15 @@ class Params:
         for name, allowed in CHOICES.items():
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {allowed}, found {getattr(self, name)!r}")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
-            raise ValueError(f"seed must be an integer >= 0, found {self.seed!r}")
+        _integer(self, "seed", 0)
+        if self.tile_points is not None:
+            _integer(self, "tile_points", SMALLEST_TILE)
+        if self.max_memory is not None:
+            _number(self, "max_memory", 0.0, math.inf)
+        if self.workers is not None:
+            _integer(self, "workers", 1)
+        if self.engine not in ENGINES and "://" not in self.engine:
+            raise ValueError(f"engine must be one of {ENGINES} or an address, found {self.engine!r}")
 
     @classmethod
     def paper(cls, **changes: Any) -> Params:
@@ -113,6 +135,13 @@ class Params:
     def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, for JSON."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def _integer(params: Params, name: str, least: int) -> None:
+    """Raise unless the field is an integer of at least `least`."""
+    value = getattr(params, name)
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{name} must be an integer >= {least}, found {value!r}")
 
 
 def _number(

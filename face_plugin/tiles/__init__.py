@@ -1,0 +1,11 @@
+"""Clouds of any size: a coarse cage over everything, and tiles solved one by one with its potential.
+
+The tiles' points lie in a folder on disk (`store`), from which whoever solves one (`engines`) reads its own
+and the halo of its neighbours' (`solve`). Nothing but this folder is shared, so a tile can be solved
+anywhere, and again.
+"""
+
+from face_plugin.tiles.choose import in_tiles
+from face_plugin.tiles.run import estimate_tiled
+
+__all__ = ["estimate_tiled", "in_tiles"]

@@ -1,0 +1,176 @@
+"""Who solves the tiles: this process, other processes of this machine, or Dask's workers.
+
+An engine gets a function, its first argument and the numbers of the tiles. The function writes its outcome
+into the store and may be called again for the same tile, so that an engine only has to see to it that every
+tile is done.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Protocol
+
+from face_plugin.errors import FaceError
+
+__all__ = ["Engine", "Job", "Processes", "Serial"]
+
+log = logging.getLogger(__name__)
+
+Job = Callable[[str, int], int]
+"""Does a tile of the store in a folder, and returns its number."""
+
+# Losses of workers in a row, without a single tile done between, after which a run gives up.
+MOST_LOSSES = 3
+
+
+class Engine(Protocol):
+    """Runs a job on every tile; a context manager."""
+
+    def __enter__(self) -> Engine:
+        """Start whatever the tiles will run on."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop it again."""
+
+    def run(self, job: Job, folder: str, tiles: Sequence[int], done: Callable[[int], None]) -> None:
+        """Run `job` on each tile, and call `done` with its number when it is finished."""
+
+
+class Serial:
+    """One tile after the other in this process."""
+
+    def __enter__(self) -> Serial:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        return None
+
+    def run(self, job: Job, folder: str, tiles: Sequence[int], done: Callable[[int], None]) -> None:
+        """Run `job` on each tile, and call `done` with its number when it is finished."""
+        for tile in tiles:
+            done(job(folder, tile))
+
+
+class Processes:
+    """Tiles in parallel in processes of this machine.
+
+    Lost processes (killed, or out of memory) are replaced, by one fewer each time that not a single tile came
+    through; the script that calls this needs no ``if __name__ == "__main__"``.
+
+    Parameters
+    ----------
+    workers : int
+        Processes at a time.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Processes:
+        self._start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stop()
+
+    def run(self, job: Job, folder: str, tiles: Sequence[int], done: Callable[[int], None]) -> None:
+        """Run `job` on each tile, and call `done` with its number when it is finished.
+
+        Raises
+        ------
+        FaceError
+            Processes died again and again.
+        """
+        left, losses = list(tiles), 0
+        while left:
+            before = len(left)
+            try:
+                self._run_once(job, folder, left, done)
+            except BrokenProcessPool:
+                losses = 0 if len(left) < before else losses + 1
+                if losses == MOST_LOSSES:
+                    raise FaceError(
+                        f"processes that solve tiles died {losses} times in a row, {len(left)} tiles left, "
+                        "probably for lack of memory: lower Params.tile_points or Params.max_memory"
+                    ) from None
+                self.workers = max(1, self.workers - (losses > 0))
+                log.warning("a process died; going on with %d tiles and %d workers", len(left), self.workers)
+                self._stop()
+                self._start()
+
+    def _run_once(self, job: Job, folder: str, left: list[int], done: Callable[[int], None]) -> None:
+        """Run what is left, and take it off the list as it gets done."""
+        assert self._pool is not None
+        # A few more than there are workers: a broken pool then has little to repeat, and Ctrl-C little to
+        # cancel.
+        waiting, running = iter(list(left)), set[Future[int]]()
+        while True:
+            with _without_main():
+                for tile in waiting:
+                    running.add(self._pool.submit(job, folder, tile))
+                    if len(running) > self.workers:
+                        break
+            if not running:
+                return
+            finished, running = wait(running, return_when=FIRST_COMPLETED)
+            for future in finished:
+                tile = future.result()
+                left.remove(tile)
+                done(tile)
+
+    def _start(self) -> None:
+        self._pool = ProcessPoolExecutor(self.workers, mp_context=multiprocessing.get_context("spawn"))
+        # Interpreters load their libraries while this process prepares the tiles.
+        with _without_main():
+            for _ in range(self.workers):
+                self._pool.submit(_warm_up)
+
+    def _stop(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+
+def _warm_up() -> None:
+    from face_plugin.meshers import delaunay
+    from face_plugin.tiles import solve
+
+    delaunay._load_gmsh()
+    assert solve
+
+
+_main_lock = threading.Lock()
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the main module while processes start.
+
+    A spawned process imports the main module of its parent, which would run a script a second time if it has
+    no ``if __name__ == "__main__"``. Jobs are functions of this package and need nothing from there.
+    """
+    main: Any = sys.modules["__main__"]
+    hidden = {}
+    with _main_lock:
+        for name in ("__spec__", "__file__"):
+            if hasattr(main, name):
+                hidden[name] = getattr(main, name)
+        try:
+            main.__spec__ = None
+            if "__file__" in hidden:
+                del main.__file__
+            yield
+        finally:
+            for name, value in hidden.items():
+                setattr(main, name, value)

@@ -1,0 +1,171 @@
+"""Fill a store: three passes over the cloud, none of which holds it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin import cloud
+from face_plugin.cloud import Frame
+from face_plugin.params import Params
+from face_plugin.tiles.coarse import VOXELS_PER_POINT, Voxels, voxel_size
+from face_plugin.tiles.partition import Partition, split
+from face_plugin.tiles.sources import CHUNK, Source
+from face_plugin.tiles.store import Store
+
+__all__ = ["SAMPLE", "fill_store", "store_key"]
+
+log = logging.getLogger(__name__)
+
+# Points that decide on the frame and on the tiles; smaller clouds decide for themselves, in any order.
+SAMPLE = 1_000_000
+# Points of the coarse cage: one in COARSE_SHARE, within these limits.
+COARSE_SHARE = 20
+COARSE_POINTS = (500, 6_000)
+
+# Settings that decide how the work is done and not what comes out.
+_NOT_IN_KEY = ("max_memory", "engine", "workers")
+
+
+def store_key(source: Source, params: Params, interior: bool) -> str:
+    """Hash of the input and of the settings that the outcome depends on."""
+    settings = {name: value for name, value in params.to_dict().items() if name not in _NOT_IN_KEY}
+    text = json.dumps([source.digest(), settings, interior], sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def fill_store(
+    folder: Path,
+    source: Source,
+    params: Params,
+    tile_points: int,
+    *,
+    interior: bool,
+    key: str = "",
+    chunk: int = CHUNK,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> tuple[Store, Voxels]:
+    """Sort a cloud into tiles on disk, and choose the points of the coarse level.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists; what it holds of the same names is overwritten.
+    source : Source
+        The cloud.
+    params : Params
+        Kept with the store.
+    tile_points : int
+        Number of points aimed at for a tile.
+    interior : bool
+        Whether the points are to be classified; kept with the store.
+    key : str
+        Kept with the store.
+    chunk : int
+        Points held at once.
+    progress : callable, optional
+
+    Returns
+    -------
+    Store
+        Not saved yet: that marks it as finished, and the coarse level is still missing.
+    Voxels
+
+    Raises
+    ------
+    ValueError
+        The cloud is not finite, or too small or flat, as `face_plugin.cloud.prepare` says.
+    """
+    sample = _sample(source, chunk)
+    frame = cloud.prepare(sample).frame
+    progress(0.25)
+    unit_sample = frame.to_unit(sample)
+    partition = split(unit_sample, max(1, round(source.count / tile_points)))
+    target = int(np.clip(source.count // COARSE_SHARE, *COARSE_POINTS))
+    size = voxel_size(unit_sample, int(VOXELS_PER_POINT * target))
+    # The sample may miss the outermost points: voxels start below any that there can be.
+    origin = unit_sample.min(axis=0) - 1000 * size
+    count, bounds, voxels = _count(source, frame, partition, origin, size, chunk)
+    progress(0.5)
+    start = np.concatenate([[0], np.cumsum(count)])
+    dtype = cloud.as_points(np.empty((0, 3), source.dtype)).dtype
+    store = Store(folder, params, frame, start, bounds, dtype, interior, key)
+    _place(store, source, partition, chunk)
+    progress(1.0)
+    log.info("%d points in %d tiles", store.count, store.tiles)
+    return store, voxels
+
+
+def _sample(source: Source, chunk: int) -> NDArray[np.float64]:
+    """Every k-th point of the cloud, after all were found to be finite."""
+    step = -(-source.count // SAMPLE) if source.count else 1
+    kept, seen = [np.empty((0, 3))], 0
+    for part, _ in source.parts(chunk):
+        try:
+            points = cloud.as_points(part)
+        except ValueError as error:
+            raise ValueError(f"{error} (rows counted from row {seen})" if seen else str(error)) from None
+        kept.append(points[-seen % step :: step].astype(np.float64))
+        seen += len(part)
+    return np.concatenate(kept)
+
+
+def _in_frame(source: Source, frame: Frame, chunk: int) -> Iterator[NDArray[np.float64]]:
+    for part, _ in source.parts(chunk):
+        yield frame.to_unit(part)
+
+
+def _count(
+    source: Source,
+    frame: Frame,
+    partition: Partition,
+    origin: NDArray[np.float64],
+    size: float,
+    chunk: int,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], Voxels]:
+    """Points and bounds of each tile, and the voxels' points."""
+    count = np.zeros(partition.tiles, dtype=np.int64)
+    bounds = np.tile(np.array([[np.inf] * 3, [-np.inf] * 3]), (partition.tiles, 1, 1))
+    voxels = Voxels(origin, size)
+    for points in _in_frame(source, frame, chunk):
+        tile = partition.assign(points)
+        here = np.bincount(tile, minlength=partition.tiles)
+        filled = np.flatnonzero(here)
+        first = (np.cumsum(here) - here)[filled]
+        by_tile = points[np.argsort(tile, kind="stable")]
+        bounds[filled, 0] = np.minimum(bounds[filled, 0], np.minimum.reduceat(by_tile, first))
+        bounds[filled, 1] = np.maximum(bounds[filled, 1], np.maximum.reduceat(by_tile, first))
+        count += here
+        voxels.add(points)
+    return count, bounds, voxels
+
+
+def _place(store: Store, source: Source, partition: Partition, chunk: int) -> None:
+    """Write the points sorted by tile, and where each came from."""
+    points_out = np.lib.format.open_memmap(
+        store.folder / "points.npy", "w+", dtype=np.float64, shape=(store.count, 3)
+    )
+    rows_out = np.lib.format.open_memmap(
+        store.folder / "rows.npy", "w+", dtype=np.int64, shape=(store.count,)
+    )
+    fill, seen = store.start[:-1].copy(), 0
+    for points in _in_frame(source, store.frame, chunk):
+        tile = partition.assign(points)
+        order = np.argsort(tile, kind="stable")
+        count = np.bincount(tile, minlength=store.tiles)
+        within = np.arange(len(tile)) - np.repeat(np.cumsum(count) - count, count)
+        place = fill[tile[order]] + within
+        points_out[place] = points[order]
+        rows_out[place] = seen + order
+        fill += count
+        seen += len(points)
+    points_out.flush()
+    rows_out.flush()
+
+

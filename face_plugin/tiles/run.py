@@ -1,0 +1,195 @@
+"""Tiles from end to end: a source of points in, what is known of each point out."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from face_plugin import cloud
+from face_plugin.params import Params
+from face_plugin.solver import Progress, Result
+from face_plugin.tiles.choose import EngineLike, make_engine, tile_size
+from face_plugin.tiles.coarse import solve_coarse
+from face_plugin.tiles.engines import Engine, Job
+from face_plugin.tiles.prepare import fill_store, store_key
+from face_plugin.tiles.solve import TILE_STAGES, solve_tile
+from face_plugin.tiles.sources import ArraySource, Source
+from face_plugin.tiles.store import Store
+
+__all__ = ["estimate_tiled", "solve_store"]
+
+log = logging.getLogger(__name__)
+
+
+def estimate_tiled(
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    filter_interior: bool = False,
+    engine: EngineLike = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Outward normals of a large cloud, solved in tiles; arguments and result as of `estimate_normals`.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of float or int, in any unit
+    params : Params, optional
+    filter_interior : bool
+        Also classify the points as interior or not.
+    engine : str, Engine or distributed.Client, optional
+        Who solves the tiles; by default `Params.engine`.
+    progress : callable, optional
+        ``progress(stage, fraction)`` with the stages "cloud", "coarse", "tiles" and "normals".
+
+    Returns
+    -------
+    Result
+        The same to the last bit for every engine and number of workers.
+
+    Raises
+    ------
+    ValueError
+        Bad input, as of `estimate_normals`, or less memory allowed than a tile needs.
+    MeshingError
+        A tile could not be meshed.
+    FaceError
+        Workers died again and again.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(3000)
+    >>> normals = estimate_tiled(ball.points, Params(tile_points=1500, engine="serial")).normals
+    >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
+    True
+    """
+    params = params or Params()
+    source = ArraySource(cloud.as_points(points))
+    with tempfile.TemporaryDirectory(prefix="face-") as folder:
+        store, timings = solve_store(
+            Path(folder), source, params, interior=filter_interior, engine=engine, progress=progress
+        )
+        return gather(store, timings)
+
+
+def solve_store(
+    folder: Path,
+    source: Source,
+    params: Params,
+    *,
+    interior: bool = False,
+    engine: EngineLike = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Store, dict[str, float]]:
+    """Solve all tiles of a cloud in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists; with Dask, at the same place for all workers.
+    source : Source
+    params : Params
+    interior : bool
+        Also classify the points.
+    engine : str, Engine or distributed.Client, optional
+    resume : bool
+        Go on from what the folder holds.
+    progress : callable, optional
+
+    Returns
+    -------
+    store : Store
+        Every tile of it is done.
+    timings : dict of str to float
+        Seconds by stage as they passed.
+
+    Raises
+    ------
+    ValueError
+        With `resume`: the folder holds work on another input or with other settings.
+    """
+    report = progress or (lambda stage, fraction: None)
+    timings: dict[str, float] = {}
+
+    def timed(stage: str, call: Callable[[], Any]) -> Any:
+        start = time.perf_counter()
+        report(stage, 0.0)
+        value = call()
+        timings[stage] = time.perf_counter() - start
+        report(stage, 1.0)
+        return value
+
+    key = store_key(source, params, interior)
+    store = _found(folder, key) if resume else None
+    points = tile_size(source.count, params)
+    with make_engine(engine, params, points, source.count) as running:
+        if store is None:
+            fill = partial(fill_store, folder, source, params, points, interior=interior, key=key)
+            store, voxels = timed("cloud", fill)
+            timed("coarse", lambda: solve_coarse(voxels, params).save(folder))
+            store.save()
+        solved: Store = store
+        timed("tiles", lambda: _run(running, solve_tile, solved, "field", report))
+    return store, timings
+
+
+def _found(folder: Path, key: str) -> Store | None:
+    """Return the store that an earlier run left, if it got so far."""
+    try:
+        store = Store.load(folder)
+    except FileNotFoundError:
+        return None
+    if store.key != key:
+        raise ValueError(
+            f"{folder} holds work on another input or with other settings: remove it, or do not resume"
+        )
+    return store
+
+
+def _run(engine: Engine, job: Job, store: Store, stage: str, report: Progress) -> None:
+    """Run a job on the tiles that a stage has not finished."""
+    left = [tile for tile in range(store.tiles) if not store.done(tile, stage)]
+    if len(left) < store.tiles:
+        log.info("%d of %d tiles are done already", store.tiles - len(left), store.tiles)
+    remaining = len(left)
+
+    def done(tile: int) -> None:
+        nonlocal remaining
+        remaining -= 1
+        report("tiles", 1.0 - remaining / store.tiles)
+
+    # The largest first: the last ones to finish then keep no worker waiting for long.
+    left.sort(key=lambda tile: (store.start[tile] - store.start[tile + 1], tile))
+    engine.run(job, str(store.folder), left, done)
+
+
+def gather(store: Store, timings: dict[str, float]) -> Result:
+    """Bring what the tiles say into the order of the input."""
+    rows = store.rows()
+    normals = np.empty((store.count, 3), dtype=store.dtype)
+    strength = np.empty(store.count, dtype=store.dtype)
+    seconds: NDArray[np.float64] = np.zeros(len(TILE_STAGES))
+    for tile in range(store.tiles):
+        row = rows[store.start[tile] : store.start[tile + 1]]
+        found = store.read(tile, "field")
+        normals[row] = store.frame.unrotate(found["normals"])
+        strength[row] = found["strength"]
+        seconds += found["seconds"]
+    return Result(
+        normals=normals,
+        strength=strength,
+        confidence=np.ones(store.count, dtype=store.dtype),
+        interior=None,
+        timings={**timings, **dict(zip(TILE_STAGES, seconds.tolist(), strict=True))},
+        params=store.params,
+    )

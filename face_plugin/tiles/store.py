@@ -1,0 +1,175 @@
+"""A cloud on disk, sorted by tile, and what is known of each tile: all that engines and workers share.
+
+A store is a folder. Workers map its arrays into memory, so that whoever hands out the tiles holds no points,
+and write a file for each tile when it is done; a file is there whole or not at all, so that an interrupted
+run can go on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.cloud import Frame
+from face_plugin.params import Params
+
+__all__ = ["Store", "Subset"]
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Subset:
+    """Points of a store inside a box."""
+
+    points: NDArray[np.float64]
+    """(k, 3) in the canonical frame."""
+    tile: NDArray[np.int64]
+    """(k,) the tile that owns each."""
+    row: NDArray[np.int64]
+    """(k,) the row of each in its tile."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """The description of a store; what it describes stays on disk.
+
+    Attributes
+    ----------
+    folder : Path
+    params : Params
+    frame : Frame
+    start : (t + 1,) int64
+        The points of tile k are the rows ``start[k]`` to ``start[k + 1]``.
+    bounds : (t, 2, 3) float64
+        Lower and upper corner of each tile's points.
+    dtype : dtype
+        Floating-point type of the input.
+    key : str
+        Hash of the input and the settings.
+    """
+
+    folder: Path
+    params: Params
+    frame: Frame
+    start: NDArray[np.int64]
+    bounds: NDArray[np.float64]
+    dtype: np.dtype[Any]
+    interior: bool
+    key: str
+
+    @property
+    def tiles(self) -> int:
+        """Number of tiles."""
+        return len(self.start) - 1
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return int(self.start[-1])
+
+    def save(self) -> None:
+        """Write the description. It comes last: a folder with one holds everything it describes."""
+        text = json.dumps(
+            {
+                "version": VERSION,
+                "key": self.key,
+                "params": self.params.to_dict(),
+                "origin": self.frame.origin.tolist(),
+                "rotation": self.frame.rotation.tolist(),
+                "scale": self.frame.scale,
+                "start": self.start.tolist(),
+                "bounds": self.bounds.tolist(),
+                "dtype": self.dtype.name,
+                "interior": self.interior,
+            }
+        )
+        temporary = self.folder / f"store.{secrets.token_hex(4)}.tmp"
+        temporary.write_text(text)
+        os.replace(temporary, self.folder / "store.json")
+
+    @classmethod
+    def load(cls, folder: Path) -> Store:
+        """Read the description of a store.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is none, or it was never finished.
+        ValueError
+            It was made by another version.
+        """
+        text = json.loads((folder / "store.json").read_text())
+        if text["version"] != VERSION:
+            raise ValueError(f"{folder}: a store of version {text['version']}, this package reads {VERSION}")
+        frame = Frame(np.array(text["origin"]), np.array(text["rotation"]), text["scale"])
+        return cls(
+            folder=folder,
+            params=Params(**text["params"]),
+            frame=frame,
+            start=np.array(text["start"], dtype=np.int64),
+            bounds=np.array(text["bounds"]).reshape(-1, 2, 3),
+            dtype=np.dtype(text["dtype"]),
+            interior=text["interior"],
+            key=text["key"],
+        )
+
+    def points(self, mode: Any = "r") -> NDArray[np.float64]:
+        """Map all points (n, 3), sorted by tile, in the canonical frame."""
+        return self._map("points.npy", mode)
+
+    def rows(self, mode: Any = "r") -> NDArray[np.int64]:
+        """Map the row (n,) in the input of each of them."""
+        return self._map("rows.npy", mode)
+
+    def _map(self, name: str, mode: Any) -> NDArray[Any]:
+        return np.asanyarray(np.load(self.folder / name, mmap_mode=mode))
+
+    def tile_points(self, tile: int) -> NDArray[np.float64]:
+        """Points (k, 3) that a tile owns."""
+        return np.array(self.points()[self.start[tile] : self.start[tile + 1]])
+
+    def within(self, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> Subset:
+        """Every point inside a box, whichever tile owns it."""
+        meets = (self.bounds[:, 0] <= upper).all(axis=1) & (self.bounds[:, 1] >= lower).all(axis=1)
+        points, tiles, rows = [], [], []
+        for tile in np.flatnonzero(meets):
+            candidates = self.tile_points(int(tile))
+            row = np.flatnonzero(((candidates >= lower) & (candidates <= upper)).all(axis=1))
+            points.append(candidates[row])
+            tiles.append(np.full(len(row), tile, dtype=np.int64))
+            rows.append(row)
+        if not points:
+            return Subset(np.empty((0, 3)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+        return Subset(np.concatenate(points), np.concatenate(tiles), np.concatenate(rows))
+
+    def path(self, tile: int, stage: str) -> Path:
+        """File of what a stage found out about a tile."""
+        return self.folder / f"{stage}-{tile:06d}.npz"
+
+    def done(self, tile: int, stage: str) -> bool:
+        """Whether a stage has finished a tile."""
+        return self.path(tile, stage).exists()
+
+    def write(self, tile: int, stage: str, **arrays: NDArray[Any]) -> None:
+        """Write what a stage found out about a tile, whole or not at all."""
+        temporary = self.folder / f"{stage}-{tile:06d}.{secrets.token_hex(4)}.tmp"
+        try:
+            with open(temporary, "wb") as stream:
+                np.savez(stream, allow_pickle=False, **arrays)
+            os.replace(temporary, self.path(tile, stage))
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    def read(self, tile: int, stage: str) -> dict[str, NDArray[Any]]:
+        """Read it back."""
+        with np.load(self.path(tile, stage)) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+

@@ -142,7 +142,7 @@ class PinnedPoisson:
     def _charges(
         self, place: NDArray[np.intp], wanted: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Charges y (k, s) with S y = `wanted` at the free vertices in rows `place`, and A^-1 E_P y (f, s)."""
+        """Charges y (k, s) with S y = `wanted` at the free rows `place`, and A^-1 E_P y (f, s)."""
         precondition = self._local_schur(place)
         limit = TOLERANCE * np.abs(wanted).max(axis=0)
         y, drawn = np.zeros_like(wanted), np.zeros((len(self.poisson.free), wanted.shape[1]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from face_plugin.locate import Locator
 from face_plugin.meshers.delaunay import delaunay_mesh
 from face_plugin.params import ALPHAS, Params
 from face_plugin.poisson import Poisson
-from face_plugin.sculpt import Sculptable
+from face_plugin.sculpt import Sculptable, SculptFile
 from face_plugin.surface import Backend, poisson_reconstruction
 
 __all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
@@ -200,6 +201,7 @@ def estimate_normals(
     params: Params | None = None,
     *,
     filter_interior: bool = False,
+    sculpt: SculptFile | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Result:
     """Outward normals of an unoriented point cloud by Faraday cage estimation.
@@ -211,6 +213,8 @@ def estimate_normals(
     params : Params, optional
     filter_interior : bool
         Also classify the points as interior or not.
+    sculpt : SculptFile or path, optional
+        Charges and cage points to apply.
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -233,7 +237,10 @@ def estimate_normals(
     >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
-    return FaCE(points, params, progress=progress).result(filter_interior=filter_interior)
+    face = FaCE(points, params, progress=progress)
+    if sculpt is not None:
+        face = face.sculpted(sculpt)
+    return face.result(filter_interior=filter_interior)
 
 
 def reconstruct(
@@ -245,13 +252,14 @@ def reconstruct(
     filter_interior: bool = True,
     backend: Backend | None = None,
     trim: float = 0.0,
+    sculpt: SculptFile | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Surface:
     """Closed surface of an unoriented point cloud: normals, interior points dropped, Poisson reconstruction.
 
     Parameters
     ----------
-    points, params, progress
+    points, params, sculpt, progress
         As in `estimate_normals`.
     screened : bool
         Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
@@ -276,6 +284,8 @@ def reconstruct(
     3
     """
     face = FaCE(points, params, progress=progress)
+    if sculpt is not None:
+        face = face.sculpted(sculpt)
     result = face.result(filter_interior=filter_interior)
     keep = slice(None) if result.interior is None else ~result.interior
     array = cloud.as_points(points)

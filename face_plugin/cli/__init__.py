@@ -17,7 +17,7 @@ from face_plugin.errors import FaceError, MissingDependencyError
 
 __all__ = ["build_parser", "main"]
 
-COMMANDS = ("normals", "mesh", "info", "plot")
+COMMANDS = ("normals", "mesh", "ribbons", "info", "plot", "chain", "script")
 
 FAILED, BAD_INPUT, MISSING, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 EXIT_CODES = """exit codes:
@@ -60,9 +60,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         args = build_parser().parse_args(argv)
-        with guarded_stdout() as write, _sigterm_raises():
-            with Console(args.command, args.verbose, args.quiet, args.json, write) as console:
-                return _run(args, console)
+        with (
+            guarded_stdout() as write,
+            _sigterm_raises(),
+            Console(args.command, args.verbose, args.quiet, args.json, write) as console,
+        ):
+            return _run(args, console)
     except SystemExit as stop:
         # argparse has said what was wrong (2), or printed its help or version (0).
         return stop.code if isinstance(stop.code, int) else BAD_INPUT

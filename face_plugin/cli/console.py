@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from face_plugin.cli.bars import Bars
 
 __all__ = ["Console", "guarded_stdout"]
 
@@ -55,8 +55,7 @@ class Console:
         self.command, self.verbose, self.quiet, self.as_json = command, verbose, quiet, as_json
         self._write = write
         self._start = time.perf_counter()
-        self._bars: Progress | None = None
-        self._tasks: dict[str, TaskID] = {}
+        self._bars: Bars | None = None
 
     def __enter__(self) -> Console:
         """Start to show log messages and warnings."""
@@ -88,16 +87,10 @@ class Console:
         if self.quiet:
             return
         if self._bars is None:
-            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+            from face_plugin.cli.bars import Bars
 
-            columns = (TextColumn("{task.description:<10}"), BarColumn(bar_width=30), TimeElapsedColumn())
-            self._bars = Progress(*columns, console=self._stderr)
-            self._bars.start()
-        if fraction <= 0 or stage not in self._tasks:
-            # Without a total the bar pulses: most stages are one long call.
-            self._tasks[stage] = self._bars.add_task(stage, total=None)
-        if fraction > 0:
-            self._bars.update(self._tasks[stage], total=1.0, completed=fraction)
+            self._bars = Bars(self._stderr)
+        self._bars.update(stage, fraction)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -130,8 +123,8 @@ class Console:
 
     def _close_bars(self) -> None:
         if self._bars is not None:
-            self._bars.stop()
-            self._bars, self._tasks = None, {}
+            self._bars.close()
+            self._bars = None
 
 
 class _Handler(logging.Handler):

@@ -30,6 +30,7 @@ def add_command(
     *,
     output: str | None = None,
     inputs: str = "point cloud",
+    suffixes: tuple[str, ...] = CLOUD_SUFFIXES,
 ) -> argparse.ArgumentParser:
     """Add a subcommand with what all of them have: the input, the output, and how much to say.
 
@@ -44,9 +45,13 @@ def add_command(
         What ``-o`` writes; None: nothing.
     inputs : str
         What the input is.
+    suffixes : tuple of str
+        Extensions that it may have.
     """
-    parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
-    parser.add_argument("input", metavar="IN", type=Path, help=f"{inputs} ({', '.join(CLOUD_SUFFIXES)})")
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=help, description=help, epilog="exit codes: see face --help"
+    )
+    parser.add_argument("input", metavar="IN", type=Path, help=f"{inputs} ({', '.join(suffixes)})")
     if output is not None:
         parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help=output)
     parser.add_argument(

@@ -27,6 +27,7 @@ def plot_interior(
     view: View = (35.0, 20.0),
     up: Up = "z",
     axis: Up | None = None,
+    pixels: int = 640,
 ) -> Any:
     """Draw the points kept and dropped in section, and the surfaces made from all points and from those kept.
 
@@ -38,7 +39,7 @@ def plot_interior(
         The points dropped.
     unfiltered, filtered : (vertices, faces)
         The surface from all points, and from the points kept.
-    title, view, up, axis
+    title, view, up, axis, pixels
         As in `plot_result`.
 
     Returns
@@ -68,21 +69,12 @@ def plot_interior(
     box = {"left": 0.045, "right": 0.99, "bottom": 0.02, "top": 0.89, "wspace": 0.06, "hspace": 0.1}
     grid = figure.add_gridspec(2, 3, width_ratios=[1.35, 1, 1], **box)
     _draw_section(plt, figure.add_subplot(grid[:, 0]), points, interior, meshes, section)
-    for column, ((vertices, faces), name) in enumerate(
-        zip(
-            meshes,
-            (f"All {len(points):,} points", f"{int((~interior).sum()):,} points kept"),
-            strict=True,
-        ),
-        start=1,
-    ):
-        show(
-            figure.add_subplot(grid[0, column]),
-            render_mesh(vertices, faces, camera=camera, size=640),
-            name,
-        )
+    names = (f"All {len(points):,} points", f"{int((~interior).sum()):,} points kept")
+    for column, (vertices, faces), name in zip((1, 2), meshes, names, strict=True):
+        whole = render_mesh(vertices, faces, camera=camera, size=pixels)
+        show(figure.add_subplot(grid[0, column]), whole, name)
         cut = section.behind(vertices, faces)
-        image = render_mesh(*cut, camera=facing, size=640) if len(cut[1]) else None
+        image = render_mesh(*cut, camera=facing, size=pixels) if len(cut[1]) else None
         show(figure.add_subplot(grid[1, column]), image, "cut open")
     return figure
 

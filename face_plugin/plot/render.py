@@ -84,12 +84,12 @@ def _shade(buffer: Buffer, normals: Array, colours: Array, back: ArrayLike | Non
     light = AMBIENT * (0.8 + 0.2 * facing[:, 1])
     for direction, strength in LIGHTS:
         # Wrapped around the terminator, so that the far side keeps its relief.
-        slant = facing @ (np.array(direction) / np.linalg.norm(direction))
+        slant = facing @ (np.array(direction, np.float32) / np.float32(np.linalg.norm(direction)))
         light += strength * np.maximum((slant + WRAP) / (1 + WRAP), 0.0)
     half = np.array(LIGHTS[0][0]) / np.linalg.norm(LIGHTS[0][0]) + np.array([0.0, 0.0, 1.0])
     shine = 0.10 * np.maximum(facing @ (half / np.linalg.norm(half)), 0.0) ** 30
     light *= _openness(buffer)[covered]
-    image = np.zeros((buffer.pixels * buffer.pixels, 4))
+    image = np.zeros((buffer.pixels * buffer.pixels, 4), dtype=np.float32)
     image[covered, :3] = np.clip(colours * light[:, None] + shine[:, None], 0.0, 1.0)
     image[covered, 3] = 1.0
     size = buffer.pixels // OVERSAMPLING
@@ -171,22 +171,25 @@ def render_mesh(
     draw_triangles(buffer, camera.project(vertices, buffer.pixels)[faces])
     covered = buffer.owner >= 0
     owner, weights = buffer.owner[covered], buffer.spot[covered]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ camera.axes.T
+    normals = (flat / _length(flat)).astype(np.float32)[owner]
     if smooth:
-        at_vertices = np.stack([_sum_at(faces, flat[:, k], len(vertices)) for k in range(3)], axis=1)
-        normals = (at_vertices[faces[owner]] / _length(at_vertices[faces[owner]]) * weights[:, :, None]).sum(
-            axis=1
-        )
+        summed = np.stack([_sum_at(faces, flat[:, k], len(vertices)) for k in range(3)], axis=1)
+        soft = _blend(summed / _length(summed), faces[owner], weights)
         # Interpolation must not turn the side of a face that the camera sees.
-        seen, true = normals @ camera.axes[2], flat[owner] @ camera.axes[2]
-        normals[seen * true < 0] = flat[owner][seen * true < 0]
-    else:
-        normals = flat[owner]
+        kept = soft[:, 2] * normals[:, 2] >= 0
+        normals[kept] = soft[kept] / _length(soft[kept])
     if colours is None:
-        painted = np.tile(np.array(colour), (len(owner), 1))
+        painted = np.tile(np.array(colour, dtype=np.float32), (len(owner), 1))
     else:
-        painted = (np.asarray(colours, dtype=np.float64)[faces[owner]] * weights[:, :, None]).sum(axis=1)
-    return _shade(buffer, normals / _length(normals) @ camera.axes.T, painted, back)
+        painted = _blend(np.asarray(colours), faces[owner], weights)
+    return _shade(buffer, normals, painted, back)
+
+
+def _blend(values: Array, corners: Array, weights: Array) -> Array:
+    """Interpolate values (k, 3) of vertices at the pixels, in single precision: there are millions."""
+    values = values.astype(np.float32)
+    return np.asarray(sum(values[corners[:, k]] * weights[:, k, None] for k in range(3)))
 
 
 def _sum_at(faces: Array, values: Array, count: int) -> Array:
@@ -195,7 +198,8 @@ def _sum_at(faces: Array, values: Array, count: int) -> Array:
 
 
 def _length(vectors: Array) -> Array:
-    return np.asarray(np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(np.maximum(length, np.finfo(length.dtype).tiny))
 
 
 def render_points(
@@ -241,5 +245,5 @@ def render_points(
     # Below 1.5 pixels a ball could fall between the pixels' centres.
     draw_discs(buffer, camera.project(points, buffer.pixels), turned, max(radius * scale, 1.5))
     covered = buffer.owner >= 0
-    painted = np.asarray(colours, dtype=np.float64)[buffer.owner[covered]]
+    painted = np.asarray(colours, dtype=np.float32)[buffer.owner[covered]]
     return _shade(buffer, buffer.spot[covered], painted, None)

@@ -32,6 +32,7 @@ def plot_result(
     view: View = (35.0, 20.0),
     up: Up = "z",
     axis: Up | None = None,
+    pixels: int = 800,
 ) -> Any:
     """Draw (a) the points coloured by strength, (b) their normals by direction, (c) a slice of E_max.
 
@@ -53,6 +54,8 @@ def plot_result(
         The axis that points upward.
     axis : {"x", "y", "z"}, optional
         The axis that the slice cuts across; by default the object's shortest.
+    pixels : int
+        Width of a rendered panel.
 
     Returns
     -------
@@ -81,14 +84,11 @@ def plot_result(
     left, middle, right = figure.subplots(1, 3, gridspec_kw={"width_ratios": [1, 1, 1.12], **box})
     norm = plt.Normalize(0.0, max(float(np.quantile(strengths, TOP)), 1e-12))
     colours = plt.colormaps["viridis"](norm(strengths))[:, :3]
-    show(
-        left,
-        render_points(points, colours, radius=0.8 * spacing, camera=camera),
-        "Field strength at the points",
-    )
+    balls = render_points(points, colours, radius=0.8 * spacing, camera=camera, size=pixels)
+    show(left, balls, "Field strength at the points")
     _colour_bar(figure, left, plt.ScalarMappable(norm, "viridis"), below=-0.05)
     painted = 0.5 + 0.5 * normals
-    discs = render_points(points, painted, radius=1.5 * spacing, normals=normals, camera=camera)
+    discs = render_points(points, painted, radius=1.5 * spacing, normals=normals, camera=camera, size=pixels)
     show(middle, discs, "Normals by direction")
     _legend_of_directions(middle, camera)
     _draw_slice(figure, plt, right, points, field, Section.through(points, up=up, axis=axis), spacing, alpha)

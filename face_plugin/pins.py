@@ -111,10 +111,11 @@ class PinnedPoisson:
             raise ValueError("pins must be distinct free vertices of the mesh")
         pins = np.concatenate([rim(mesh, joined), held])
         out: NDArray[np.float64] = potential.copy()
+        cage = potential[np.argmax(mesh.owner >= 0)]
         if len(pins) == 0:
+            out[joined] = cage
             return out
         joins = np.arange(len(pins)) < len(pins) - len(held)
-        cage = potential[np.argmax(mesh.owner >= 0)]
         gap = np.where(joins[:, None], cage, value) - potential[pins]
         r = joins - self._raised[pins]
         y, drawn = self._charges(np.searchsorted(free, pins), np.column_stack([gap, r]))

@@ -1,0 +1,253 @@
+"""The PyMeshLab filters with the real PyMeshLab: its conventions, and nothing else of a layer touched."""
+
+import numpy as np
+import pytest
+from face_plugin.adapters import pymeshlab as face
+
+from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin.shapes import nested_box, torus
+
+ml = pytest.importorskip("pymeshlab")
+
+SHAPE = torus(600)
+NESTED = nested_box(900)
+NAMES = (
+    "compute_normal_by_faraday_cage",
+    "compute_selection_by_faraday_interior",
+    "compute_scalar_by_faraday_strength",
+    "generate_surface_reconstruction_faraday",
+)
+
+
+def layer(points=SHAPE.points, *, turned=False):
+    """Two layers, of which the first is current and has all that a layer can have."""
+    ms = ml.MeshSet()
+    colours = np.tile([0.25, 0.5, 0.75, 1.0], (len(points), 1))
+    numbers = np.arange(len(points), dtype=float)
+    ms.add_mesh(ml.Mesh(points, v_scalar_array=numbers, v_color_matrix=colours), "scan")
+    ms.add_mesh(ml.Mesh(points[:10]), "other")
+    ms.set_current_mesh(0)
+    mesh = ms.current_mesh()
+    mesh.add_vertex_custom_scalar_attribute(numbers, "label")
+    mesh.add_vertex_custom_point_attribute(points[:, ::-1].copy(), "flow")
+    ms.compute_selection_by_condition_per_vertex(condselect="vi < 250")
+    if turned:
+        ms.compute_matrix_from_rotation(angle=33, rotaxis="X axis", freeze=False)
+        ms.compute_matrix_from_translation(axisx=5, freeze=False)
+    return ms
+
+
+def contents(mesh):
+    """Read everything of a layer but its normals."""
+    return {
+        "id": mesh.id(),
+        "label": mesh.label(),
+        "visible": mesh.is_visible(),
+        "matrix": mesh.transform_matrix().tolist(),
+        "vertices": mesh.vertex_matrix().tolist(),
+        "scalars": mesh.vertex_scalar_array().tolist(),
+        "colours": mesh.vertex_color_matrix().tolist(),
+        "selected": mesh.vertex_selection_array().tolist(),
+        "attribute": mesh.vertex_custom_scalar_attribute_array("label").tolist(),
+        "point attribute": mesh.vertex_custom_point_attribute_matrix("flow").tolist(),
+    }
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_normals_are_those_of_the_array_call_and_all_else_stays(turned):
+    ms = layer(turned=turned)
+    before = contents(ms.mesh(0))
+    assert face.compute_normal_by_faraday_cage(ms) is None
+    # In the layer's own coordinates, as MeshLab's filters: its matrix is applied for display only.
+    assert np.array_equal(ms.mesh(0).vertex_normal_matrix(), estimate_normals(SHAPE.points).normals)
+    assert contents(ms.mesh(0)) == before
+    assert (ms.current_mesh_id(), ms.mesh_number()) == (0, 2)
+
+
+def test_normals_can_be_written_again_and_again():
+    ms = layer()
+    for seed in (0, 1, 2):
+        face.compute_normal_by_faraday_cage(ms, seed=seed)
+        expected = estimate_normals(SHAPE.points, Params(seed=seed)).normals
+        assert np.array_equal(ms.mesh(0).vertex_normal_matrix(), expected)
+
+
+def test_only_the_selected_vertices_change_but_all_conduct():
+    ms = layer()
+    face.compute_normal_by_faraday_cage(ms, onselected=True)
+    normals = ms.mesh(0).vertex_normal_matrix()
+    assert np.array_equal(normals[:250], estimate_normals(SHAPE.points).normals[:250])
+    assert not normals[250:].any()
+    face.compute_scalar_by_faraday_strength(ms, onselected=True)
+    scalars = ms.mesh(0).vertex_scalar_array()
+    assert np.array_equal(scalars[:250], estimate_normals(SHAPE.points).strength[:250])
+    assert np.array_equal(scalars[250:], np.arange(250, 600))
+
+
+def test_settings_have_the_names_of_the_method_and_meshlabs_types():
+    diagonal = float(np.linalg.norm(np.ptp(SHAPE.points, axis=0)))
+    params = Params(cage_spacing=0.05 * diagonal, solid="icosahedron")
+    expected = estimate_normals(SHAPE.points, params).normals
+    for arguments in (
+        {"cage_spacing": ml.PercentageValue(5), "solid": "icosahedron"},
+        {"cage_spacing": ml.PureValue(0.05 * diagonal), "solid": 1},
+    ):
+        ms = layer()
+        face.compute_normal_by_faraday_cage(ms, **arguments)
+        # Percentage and diagonal round: 1e-12 is far above that, and far below what another setting changes.
+        assert np.allclose(ms.mesh(0).vertex_normal_matrix(), expected, atol=1e-12)
+
+
+def test_interior_points_are_selected_for_meshlab_to_delete():
+    inside = estimate_normals(NESTED.points, Params(alpha=0.02), filter_interior=True).interior
+    ms = layer(NESTED.points)
+    before = contents(ms.mesh(0))
+    face.compute_selection_by_faraday_interior(ms, alpha=0.02)
+    assert np.array_equal(ms.mesh(0).vertex_selection_array(), inside)
+    assert contents(ms.mesh(0)) == {**before, "selected": inside.tolist()}
+    ms.meshing_remove_selected_vertices()
+    assert np.array_equal(ms.current_mesh().vertex_matrix(), NESTED.points[~inside])
+
+
+def test_field_strength_becomes_the_scalar():
+    ms = layer()
+    before = contents(ms.mesh(0))
+    face.compute_scalar_by_faraday_strength(ms)
+    strength = estimate_normals(SHAPE.points).strength
+    assert contents(ms.mesh(0)) == {**before, "scalars": strength.tolist()}
+
+
+def test_a_surface_is_a_new_current_layer_in_the_coordinates_of_the_scene():
+    ms = layer(NESTED.points, turned=True)
+    before = contents(ms.mesh(0))
+    face.generate_surface_reconstruction_faraday(ms, depth=5)
+    mesh = ms.current_mesh()
+    assert (mesh.id(), mesh.label(), ms.mesh_number()) == (2, "Faraday mesh", 3)
+    assert np.array_equal(mesh.transform_matrix(), np.eye(4))
+    surface = reconstruct(ms.mesh(0).transformed_vertex_matrix(), depth=5, backend="pymeshlab")
+    assert np.array_equal(mesh.vertex_matrix(), surface.vertices)
+    assert np.array_equal(mesh.face_matrix(), surface.faces)
+    assert contents(ms.mesh(0)) == before
+    # MeshLab's own reconstruction makes the same of a layer's matrix.
+    ms.set_current_mesh(0)
+    face.compute_normal_by_faraday_cage(ms)
+    ms.generate_surface_reconstruction_screened_poisson(depth=5, threads=1)
+    host = ms.current_mesh()
+    assert np.array_equal(host.transform_matrix(), np.eye(4))
+    assert np.allclose(host.vertex_matrix().mean(axis=0), mesh.vertex_matrix().mean(axis=0), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"spacing": 1}, "PyMeshLabException", "Parameter spacing not found for filter compute_normal_by_"),
+        ({"cage_spacing": 0.1}, "PyMeshLabException", "must be a pymeshlab.PercentageValue object or"),
+        ({"alpha": "thick"}, "RuntimeError", "[uU]nable to cast Python instance of type <class 'str'>"),
+        ({"alpha": None}, "RuntimeError", "unable to cast Python instance of type <class 'NoneType'>"),
+        ({"seed": 1.5}, "RuntimeError", "unable to cast Python instance of type <class 'float'>"),
+        ({"onselected": "yes"}, "RuntimeError", "unable to cast Python instance of type <class 'str'>"),
+        ({"solid": "cube"}, "InvalidEnumException", "Enum 'cube' not found. Possible values are 'octa"),
+        ({"solid": 2}, "InvalidEnumException", "Enum 2 not valid. Must be a value between 0 and 2"),
+        ({"solid": 0.5}, "RuntimeError", "unable to cast Python instance of type <class 'float'>"),
+        ({"alpha": 1.5}, "PyMeshLabException", "Failed to apply filter: compute_.*\nDetails: alpha must"),
+        ({"seed": -1}, "PyMeshLabException", "Failed to apply filter: compute_.*\nDetails: seed must"),
+    ],
+)
+def test_wrong_parameters_raise_what_pymeshlab_raises(arguments, error, message):
+    kind = getattr(ml, error, RuntimeError)
+    ms = layer()
+    with pytest.raises(kind, match=message) as caught:
+        face.compute_normal_by_faraday_cage(ms, **arguments)
+    assert type(caught.value) is kind
+    assert not ms.mesh(0).vertex_normal_matrix().any()
+
+
+def test_the_kinds_of_errors_are_those_of_pymeshlabs_own_filters():
+    ms = layer()
+    for error, arguments in (
+        (ml.PyMeshLabException, {"spacing": 1}),
+        (RuntimeError, {"k": "ten"}),
+        (RuntimeError, {"k": 1.5}),
+        (RuntimeError, {"flipflag": "yes"}),
+    ):
+        with pytest.raises(error) as caught:
+            ms.compute_normal_for_point_clouds(**arguments)
+        assert type(caught.value) is error
+    with pytest.raises(ml.InvalidEnumException, match="Enum 'cube' not found"):
+        ms.compute_color_from_scalar_per_vertex(colormap="cube")
+    with pytest.raises(ml.PyMeshLabException, match=r"must be a pymeshlab\.Percentage"):
+        ms.generate_sampling_poisson_disk(radius=0.1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_without_a_layer_the_filters_say_what_meshlabs_say(name):
+    with pytest.raises(ml.PyMeshLabException, match=f"{name} requires at least one mesh"):
+        getattr(face, name)(ml.MeshSet())
+
+
+def test_only_the_selection_of_a_layer_without_one():
+    ms = layer()
+    ms.set_selection_none()
+    with pytest.raises(ml.PyMeshLabException, match="there is no selection") as ours:
+        face.compute_normal_by_faraday_cage(ms, onselected=True)
+    with pytest.raises(ml.PyMeshLabException) as host:
+        ms.compute_normal_by_function_per_vertex(onselected=True)
+    assert str(ours.value).split("\n")[1] == str(host.value).split("\n")[1]
+
+
+def test_bad_points_are_the_filters_failure():
+    ms = ml.MeshSet()
+    ms.add_mesh(ml.Mesh(np.eye(3)))
+    with pytest.raises(ml.PyMeshLabException, match="Details: points must hold at least 4 points, found 3"):
+        face.compute_normal_by_faraday_cage(ms)
+
+
+def test_an_attribute_that_breaks_meshlabs_expressions_is_named_as_the_cause():
+    ms = ml.MeshSet()
+    ms.add_mesh(ml.Mesh(SHAPE.points))
+    ms.current_mesh().add_vertex_custom_scalar_attribute(np.zeros(600), "scan angle")
+    with pytest.raises(ml.PyMeshLabException, match="may have a name that is no identifier"):
+        face.compute_normal_by_faraday_cage(ms)
+
+
+def test_attributes_with_the_names_of_ours_are_left_alone():
+    ms = ml.MeshSet()
+    ms.add_mesh(ml.Mesh(SHAPE.points))
+    for number in range(200):
+        ms.current_mesh().add_vertex_custom_scalar_attribute(np.full(600, float(number)), f"faraday_{number}")
+    face.compute_normal_by_faraday_cage(ms)
+    assert np.array_equal(ms.current_mesh().vertex_normal_matrix(), estimate_normals(SHAPE.points).normals)
+    for number in range(200):
+        values = ms.current_mesh().vertex_custom_scalar_attribute_array(f"faraday_{number}")
+        assert np.array_equal(values, np.full(600, float(number)))
+
+
+def test_attributes_of_ours_stay_out_of_files(tmp_path):
+    ms = layer()
+    face.compute_normal_by_faraday_cage(ms)
+    ms.save_current_mesh(str(tmp_path / "scan.ply"))
+    assert b"faraday" not in (tmp_path / "scan.ply").read_bytes()
+
+
+def test_registered_filters_are_methods_and_known_by_name():
+    originals = {name: ml.MeshSet.__dict__[name] for name in ("apply_filter", "apply_filter_script")}
+    assert not any(hasattr(ml.MeshSet, name) for name in NAMES)
+    face.register()
+    face.register()
+    try:
+        ms = layer()
+        assert ms.compute_normal_by_faraday_cage(seed=1) is None
+        first = ms.mesh(0).vertex_normal_matrix()
+        assert ms.apply_filter("compute_normal_by_faraday_cage", seed=2) == {}
+        assert np.array_equal(first, estimate_normals(SHAPE.points, Params(seed=1)).normals)
+        assert np.array_equal(
+            ms.mesh(0).vertex_normal_matrix(), estimate_normals(SHAPE.points, Params(seed=2)).normals
+        )
+        assert ms.get_geometric_measures()["bbox"] is not None
+        with pytest.raises(ml.PyMeshLabException, match="Filter does not exists"):
+            ms.apply_filter("compute_normal_by_magic")
+    finally:
+        face.unregister()
+        face.unregister()
+    assert not any(hasattr(ml.MeshSet, name) for name in NAMES)
+    assert {name: ml.MeshSet.__dict__[name] for name in originals} == originals

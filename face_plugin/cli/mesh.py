@@ -14,6 +14,7 @@ from face_plugin.cli.options import (
     add_command,
     add_interior,
     add_method,
+    add_sculpt,
     add_surface,
     params_of,
     surface_of,
@@ -39,6 +40,7 @@ def register(commands: Any) -> None:
         help="also write the points it was made from, with their normals",
     )
     add_interior(parser, default=True)
+    add_sculpt(parser)
     add_surface(parser)
     add_method(parser)
 
@@ -49,15 +51,16 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
 
     output = check_output(args.output, MESH_SUFFIXES)
     side_output = None if args.cloud is None else check_output(args.cloud, CLOUD_SUFFIXES)
-    params = params_of(args)
+    params, options = params_of(args), surface_of(args)
     with console.stage("read"):
         cloud = read_cloud(args.input)
     surface = reconstruct(
         cloud.points,
         params,
         filter_interior=args.filter_interior,
+        sculpt=args.sculpt,
         progress=console.progress,
-        **surface_of(args),
+        **options,
     )
     result = surface.result
     dropped = 0 if result.interior is None else int(result.interior.sum())

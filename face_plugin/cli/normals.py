@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.cli.console import Console
-from face_plugin.cli.options import add_command, add_interior, add_method, params_of
+from face_plugin.cli.options import add_command, add_interior, add_method, add_sculpt, params_of
 from face_plugin.io import CLOUD_SUFFIXES, check_output, read_cloud, write_cloud
 
 __all__ = ["register"]
@@ -31,6 +31,7 @@ def register(commands: Any) -> None:
     parser.add_argument(
         "--scalars", action="store_true", help="write field strength and confidence of each point"
     )
+    add_sculpt(parser)
     add_method(parser)
 
 
@@ -43,7 +44,9 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     with console.stage("read"):
         cloud = read_cloud(args.input)
     wanted = args.filter_interior or args.mark_interior
-    result = estimate_normals(cloud.points, params, filter_interior=wanted, progress=console.progress)
+    result = estimate_normals(
+        cloud.points, params, filter_interior=wanted, sculpt=args.sculpt, progress=console.progress
+    )
     extra: dict[str, NDArray[Any]] = {}
     if args.scalars:
         extra.update({"strength": result.strength, "confidence": result.confidence})

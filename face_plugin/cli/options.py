@@ -14,10 +14,20 @@ from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from face_plugin.cli.console import Console
+from face_plugin.errors import require
 from face_plugin.io import CLOUD_SUFFIXES
 from face_plugin.params import Params
 
-__all__ = ["Command", "add_command", "add_interior", "add_method", "add_surface", "params_of", "surface_of"]
+__all__ = [
+    "Command",
+    "add_command",
+    "add_interior",
+    "add_method",
+    "add_sculpt",
+    "add_surface",
+    "params_of",
+    "surface_of",
+]
 
 Command = Callable[[argparse.Namespace, Console], "tuple[dict[str, Any], str]"]
 
@@ -95,6 +105,8 @@ def _kind(hint: Any) -> dict[str, Any]:
     parts = [part for part in _alternatives(hint) if part is not NoneType]
     names = [name for part in parts if get_origin(part) is Literal for name in get_args(part)]
     numbers = [part for part in parts if part in (int, float)]
+    if str in parts:
+        return {"metavar": "NAME"}
     if not numbers:
         return {"choices": names}
     if not names:
@@ -141,12 +153,22 @@ def add_interior(parser: argparse.ArgumentParser, *, default: bool) -> None:
     )
 
 
+def add_sculpt(parser: argparse.ArgumentParser) -> None:
+    """Add ``--sculpt``."""
+    parser.add_argument(
+        "--sculpt", metavar="JSON", type=Path, help="carve and shield as this file of point charges says"
+    )
+
+
 def add_surface(parser: argparse.ArgumentParser) -> None:
     """Add the options of Poisson surface reconstruction."""
-    from face_plugin.surface import BACKENDS
+    from face_plugin.surface import BACKENDS, DEPTHS
 
     group = parser.add_argument_group("surface")
-    group.add_argument("--depth", type=int, default=8, metavar="N", help="depth of the octree [default: 8]")
+    depths = range(DEPTHS[0], DEPTHS[1] + 1)
+    group.add_argument(
+        "--depth", type=int, choices=depths, default=8, metavar="N", help="depth of the octree [default: 8]"
+    )
     group.add_argument(
         "--unscreened",
         action="store_true",
@@ -165,5 +187,8 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
 
 
 def surface_of(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `add_surface` as keywords of the library."""
+    """Return the options of `add_surface` as keywords of the library; a backend must be installed."""
+    if args.backend is not None:
+        # Said now rather than after the computation.
+        require(args.backend, extra=args.backend)
     return {"depth": args.depth, "screened": not args.unscreened, "backend": args.backend, "trim": args.trim}

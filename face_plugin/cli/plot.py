@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from face_plugin.cli.console import Console
-from face_plugin.cli.options import add_command, add_method, add_surface, params_of, surface_of
+from face_plugin.cli.options import add_command, add_method, add_sculpt, add_surface, params_of, surface_of
 from face_plugin.io import check_output, read_cloud
 from face_plugin.params import ALPHAS, Params
 
@@ -41,6 +41,7 @@ def register(commands: Any) -> None:
         "--axis", choices=("x", "y", "z"), help="the axis that the slice cuts across [default: the shortest]"
     )
     parser.add_argument("--title", help="title of the picture [default: the name of the file]")
+    add_sculpt(parser)
     add_surface(parser)
     add_method(parser)
 
@@ -63,10 +64,12 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     output = check_output(args.output, plot.PLOT_SUFFIXES)
     # Said now rather than after the computation.
     require("matplotlib", extra="plot")
-    params = params_of(args)
+    params, options = params_of(args), surface_of(args)
     with console.stage("read"):
         points = read_cloud(args.input).points
     face = FaCE(points, params, progress=console.progress)
+    if args.sculpt is not None:
+        face = face.sculpted(args.sculpt)
     result = face.result(filter_interior=args.interior)
     looks = {
         "title": args.input.name if args.title is None else args.title,
@@ -79,9 +82,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         meshes = []
         for keep in (slice(None), ~result.interior):
             with console.stage("surface"):
-                meshes.append(
-                    poisson_reconstruction(points[keep], result.normals[keep], **surface_of(args))[:2]
-                )
+                meshes.append(poisson_reconstruction(points[keep], result.normals[keep], **options)[:2])
         with console.stage("draw"):
             figure = plot.plot_interior(points, result.interior, *meshes, **looks)
         summary["dropped"] = int(result.interior.sum())

@@ -19,6 +19,9 @@ __all__ = ["Locator"]
 
 # A barycentric coordinate may be this much below zero: a position on a facet belongs to either side.
 SLACK = 1e-12
+# The same where a walk does not end, since rounding decides between tetrahedra as small as that, or beside the crack
+# that a dropped, flat tetrahedron leaves.
+LOOSE = 1e-3
 # A walk from the nearest vertex takes about five steps; one that takes more than this many runs in circles.
 LONGEST_WALK = 500
 
@@ -81,7 +84,6 @@ class Locator:
             )
             todo = todo[tet[todo] < 0]
         if len(todo):
-            # In the crack that a dropped, flat tetrahedron leaves, or beside it.
             tet[todo], weights[todo] = _least_outside(points[todo], self._vertices, self.tets)
         weights[inside] = np.clip(weights[inside], 0.0, 1.0)
         weights[inside] /= weights[inside].sum(axis=1, keepdims=True)
@@ -161,19 +163,31 @@ def _det(a, b, c):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _walk(points, vertices, tets, nearest, start, incident):  # type: ignore[no-untyped-def]
-    """Visibility walk from a vertex to each position; -1 where it leaves the mesh or does not end."""
+    """Visibility walk from a vertex to each position; -1 where it gets nowhere."""
     found = np.full(len(points), -1, dtype=np.int64)
     weights = np.empty((len(points), 4))
+    trial = np.empty(4)
     for k in range(len(points)):
-        tet = incident[start[nearest[k]]]
+        tet, best = incident[start[nearest[k]]], -LOOSE
         for _ in range(LONGEST_WALK):
-            worst = _coordinates(points[k], vertices, tets[tet], weights[k])
-            if weights[k, worst] >= -SLACK:
+            smallest = trial[_coordinates(points[k], vertices, tets[tet], trial)]
+            if smallest > best:
+                best = smallest
                 found[k] = tet
+                weights[k] = trial
+            if smallest >= -SLACK:
                 break
-            tet = _neighbour(tets, tet, worst, start, incident)
-            if tet < 0:
+            # Through the facet that hides the position most; the next one where a crack lies behind it.
+            other = -1
+            while other < 0 and smallest < -SLACK:
+                facet = np.argmin(trial)
+                smallest = trial[facet]
+                trial[facet] = 0.0
+                if smallest < -SLACK:
+                    other = _neighbour(tets, tet, facet, start, incident)
+            if other < 0:
                 break
+            tet = other
     return found, weights
 
 

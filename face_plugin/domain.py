@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from face_plugin.cage import Balls
+from face_plugin.errors import MeshingError
 
 __all__ = ["Box", "Filling", "fill", "padded_box"]
 
@@ -41,11 +43,11 @@ class Filling:
     """(q, 3) on the box, its corners among them."""
 
 
-def padded_box(balls: Balls, padding: float) -> Box:
+def padded_box(balls: Balls, padding: float, least_side: float = 0.25) -> Box:
     """Return the box around the balls, padded by `padding` times its shortest side (paper section 3.1).
 
-    The pad is never less than `padding` times a quarter of the longest side: around a flat object the paper's pad
-    would vanish, and with it the field outside.
+    The side counts as no shorter than `least_side` times the longest one: around a flat object the paper's
+    pad would vanish, and with it the field outside. 0 is the paper's own pad.
 
     Examples
     --------
@@ -57,12 +59,19 @@ def padded_box(balls: Balls, padding: float) -> Box:
     lower = (balls.centres - balls.radii[:, None]).min(axis=0)
     upper = (balls.centres + balls.radii[:, None]).max(axis=0)
     side = upper - lower
-    pad = padding * max(float(side.min()), 0.25 * float(side.max()))
+    pad = padding * max(float(side.min()), least_side * float(side.max()))
     return Box(lower - pad, upper + pad)
 
 
 def fill(
-    balls: Balls, spacing: NDArray[np.float64], box: Box, *, grading: float, finest: float, seed: int
+    balls: Balls,
+    spacing: NDArray[np.float64],
+    box: Box,
+    *,
+    grading: float,
+    finest: float,
+    seed: int,
+    most: float = math.inf,
 ) -> Filling:
     """Place free vertices at the leaf centres of an octree that is fine near the balls.
 
@@ -77,6 +86,13 @@ def fill(
     grading : float, cell size per distance to the nearest ball
     finest : float, smallest cell size in local spacings
     seed : int
+    most : float
+        Number of cells that the octree may have.
+
+    Raises
+    ------
+    MeshingError
+        The octree would have more cells than `most`.
 
     Examples
     --------
@@ -93,11 +109,19 @@ def fill(
     inner, outer = [], []
     octants = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(1, 8, 3)
     rng = np.random.default_rng(seed)
+    cells_so_far = 0
     for level in range(MAXIMUM_LEVEL):
         size = side / (cells << level)
         centre = box.lower + (cell + 0.5) * size
         distance, nearest = tree.query(centre, workers=-1)
         split = size.max() > np.maximum(grading * distance, finest * spacing[nearest])
+        cells_so_far += np.count_nonzero(~split)
+        if cells_so_far + 8 * np.count_nonzero(split) > most:
+            raise MeshingError(
+                f"the space between {len(balls.radii)} balls takes more than {most:.0f} free vertices, which is "
+                "what the memory allowed holds; try a larger Params.finest, Params.grading or "
+                "Params.cage_spacing, Params.tile_points, or Params.max_memory"
+            )
         leaf, leaf_cell = centre[~split], cell[~split]
         jittered = leaf + rng.uniform(-JITTER, JITTER, leaf.shape) * size
         near, ball = tree.query(jittered, workers=-1)

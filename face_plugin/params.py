@@ -55,8 +55,11 @@ class Params:
     # Domain and mesh
     padding: float = 0.1
     """Space around the object, as a fraction of its shortest side; > 0."""
+    least_side: float = 0.25
+    """A side counts as no shorter than this fraction of the longest one when it sets the padding; [0, 1];
+    0 = the paper's padding, which vanishes around a flat object."""
     mesher: Literal["auto", "delaunay", "tetgen", "tetwild"] = "auto"
-    """Mesher; "auto" is "delaunay"."""
+    """Mesher: plain Delaunay, the paper's TetGen, fTetWild; "auto" is "delaunay", and others where it fails."""
     grading: float = 0.8
     """Size of the tetrahedra far from the points, as a fraction of the distance to the nearest; (0, 2]."""
     finest: float = 1.5
@@ -96,6 +99,7 @@ class Params:
     def __post_init__(self) -> None:
         _number(self, "ball_radius", 0.0, 0.5)
         _number(self, "padding", 0.0, 100.0)
+        _number(self, "least_side", 0.0, 1.0, closed=True, least=True)
         _number(self, "grading", 0.0, 2.0, closed=True)
         _number(self, "finest", 0.0, 10.0, closed=True)
         if self.cage_spacing is not None:
@@ -120,7 +124,10 @@ class Params:
 
     @classmethod
     def paper(cls, **changes: Any) -> Params:
-        """Return the paper's own choices: icosahedra at every point, TetGen, six directions, plain gradients.
+        """Return the paper's own choices.
+
+        Icosahedra at every point, a box padded by 0.1 times its shortest side, TetGen with its quality bounds,
+        six directions, plain gradients, its threshold for complete input and winding numbers.
 
         Examples
         --------
@@ -128,7 +135,16 @@ class Params:
         'icosahedron'
         """
         paper = cls(
-            solid="icosahedron", cage_spacing=0.0, mesher="tetgen", directions="icosahedron", angles="field"
+            ball_radius=0.45,
+            solid="icosahedron",
+            cage_spacing=0.0,
+            padding=0.1,
+            least_side=0.0,
+            mesher="tetgen",
+            directions="icosahedron",
+            angles="field",
+            alpha="dense",
+            inside="winding",
         )
         return dataclasses.replace(paper, **changes)
 

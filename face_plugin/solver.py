@@ -17,11 +17,12 @@ from scipy.spatial import cKDTree
 
 from face_plugin import cage, cloud, domain, field, normals
 from face_plugin.locate import Locator
-from face_plugin.meshers.delaunay import delaunay_mesh
+from face_plugin.meshers.select import build_mesh
 from face_plugin.params import ALPHAS, Params
 from face_plugin.poisson import Poisson
 from face_plugin.sculpt import Sculptable, SculptFile
 from face_plugin.surface import Backend, poisson_reconstruction
+from face_plugin.tiles.choose import EngineLike, in_tiles
 
 __all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
 
@@ -111,16 +112,13 @@ class FaCE(Sculptable):
             self.balls = cage.build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
             )
-        # 3. A padded box, and free vertices that grade from the balls to it.
+        # 3. A padded box.
         with self._stage("domain"):
-            box = domain.padded_box(self.balls, params.padding)
-            spacing = cage.local_spacing(self.balls.centres)
-            filling = domain.fill(
-                self.balls, spacing, box, grading=params.grading, finest=params.finest, seed=params.seed
-            )
-        # 4. Tetrahedra between the box and the balls.
+            box = domain.padded_box(self.balls, params.padding, params.least_side)
+            local = cage.local_spacing(self.balls.centres)
+        # 4. Tetrahedra between the box and the balls, graded from these to it.
         with self._stage("mesh"):
-            self.mesh = delaunay_mesh(self.balls, filling, box)
+            self.mesh = build_mesh(self.balls, local, box, params)
         # 5. Potentials in three basis fields; every other direction is their combination.
         with self._stage("poisson"):
             self.poisson = Poisson(self.mesh, params.solver)
@@ -202,9 +200,12 @@ def estimate_normals(
     *,
     filter_interior: bool = False,
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
+    engine: EngineLike = None,
     progress: Progress | None = None,
 ) -> Result:
     """Outward normals of an unoriented point cloud by Faraday cage estimation.
+
+    Large clouds are solved in tiles, as `Params.tile_points` says; see `face_plugin.tiles`.
 
     Parameters
     ----------
@@ -214,7 +215,9 @@ def estimate_normals(
     filter_interior : bool
         Also classify the points as interior or not.
     sculpt : SculptFile or path, optional
-        Charges and cage points to apply.
+        Charges and cage points to apply. The cloud is then solved in one piece, whatever its size.
+    engine : str, Engine or distributed.Client, optional
+        Who solves tiles; by default `Params.engine`.
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -237,7 +240,14 @@ def estimate_normals(
     >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
-    face = FaCE(points, params, progress=progress)
+    array = cloud.as_points(points)
+    if sculpt is None and in_tiles(len(array), params or Params()):
+        from face_plugin.tiles.run import estimate_tiled
+
+        return estimate_tiled(
+            array, params, filter_interior=filter_interior, engine=engine, progress=progress
+        )
+    face = FaCE(array, params, progress=progress)
     if sculpt is not None:
         face = face.sculpted(sculpt)
     return face.result(filter_interior=filter_interior)
@@ -253,13 +263,14 @@ def reconstruct(
     backend: Backend | None = None,
     trim: float = 0.0,
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
+    engine: EngineLike = None,
     progress: Progress | None = None,
 ) -> Surface:
     """Closed surface of an unoriented point cloud: normals, interior points dropped, Poisson reconstruction.
 
     Parameters
     ----------
-    points, params, sculpt, progress
+    points, params, sculpt, engine, progress
         As in `estimate_normals`.
     screened : bool
         Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
@@ -283,14 +294,17 @@ def reconstruct(
     >>> surface.faces.shape[1]
     3
     """
-    face = FaCE(points, params, progress=progress)
-    if sculpt is not None:
-        face = face.sculpted(sculpt)
-    result = face.result(filter_interior=filter_interior)
+    result = estimate_normals(
+        points, params, filter_interior=filter_interior, sculpt=sculpt, engine=engine, progress=progress
+    )
     keep = slice(None) if result.interior is None else ~result.interior
     array = cloud.as_points(points)
-    with face._stage("surface"):
-        vertices, faces, densities = poisson_reconstruction(
-            array[keep], result.normals[keep], depth=depth, screened=screened, backend=backend, trim=trim
-        )
-    return Surface(vertices, faces, densities, dataclasses.replace(result, timings=dict(face.timings)))
+    report = progress or (lambda stage, fraction: None)
+    report("surface", 0.0)
+    start = time.perf_counter()
+    vertices, faces, densities = poisson_reconstruction(
+        array[keep], result.normals[keep], depth=depth, screened=screened, backend=backend, trim=trim
+    )
+    timings = {**result.timings, "surface": time.perf_counter() - start}
+    report("surface", 1.0)
+    return Surface(vertices, faces, densities, dataclasses.replace(result, timings=timings))

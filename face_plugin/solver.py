@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from face_plugin import cage, cloud, domain, field, normals
 from face_plugin.locate import Locator
 from face_plugin.meshers.select import build_mesh
-from face_plugin.params import ALPHAS, Params
+from face_plugin.params import Params
 from face_plugin.poisson import Poisson
 from face_plugin.sculpt import Sculptable, SculptFile
 from face_plugin.surface import Backend, poisson_reconstruction

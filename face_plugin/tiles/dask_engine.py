@@ -80,7 +80,7 @@ class Dask:
         """
         waiting = iter(tiles)
         threads = max(1, sum(self._client.nthreads().values()))
-        running = self._distributed.as_completed()
+        running = self._distributed.as_completed(loop=self._client.loop)
 
         def submit() -> None:
             for tile in waiting:

@@ -64,8 +64,8 @@ class Serial:
 class Processes:
     """Tiles in parallel in processes of this machine.
 
-    Lost processes (killed, or out of memory) are replaced, by one fewer each time that not a single tile came
-    through; the script that calls this needs no ``if __name__ == "__main__"``.
+    Lost processes (killed, or out of memory) are replaced, by one fewer each time that not a single tile
+    came through; the script that calls this needs no ``if __name__ == "__main__"``.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _warm_up() -> None:
     from face_plugin.meshers import delaunay
     from face_plugin.tiles import solve
 
-    delaunay._load_gmsh()
+    delaunay.gmsh_loads()
     assert solve
 
 

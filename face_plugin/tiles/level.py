@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from face_plugin import cage, domain
 from face_plugin.errors import MeshingError
 from face_plugin.meshers import CageMesh
-from face_plugin.meshers.delaunay import delaunay_mesh
+from face_plugin.meshers.select import build_mesh
 from face_plugin.params import Params
 from face_plugin.poisson import Poisson
 
@@ -106,11 +106,9 @@ def _mesh(
         balls = _within(balls, box)
     clock("cage")
     if box is None:
-        box = domain.padded_box(balls, params.padding)
+        box = domain.padded_box(balls, params.padding, params.least_side)
     spacing = cage.local_spacing(balls.centres)
-    filling = domain.fill(balls, spacing, box, grading=params.grading, finest=params.finest, seed=seed)
-    clock("domain")
-    mesh = delaunay_mesh(balls, filling, box)
+    mesh = build_mesh(balls, spacing, box, dataclasses.replace(params, seed=seed))
     clock("mesh")
     return balls, mesh
 

@@ -10,8 +10,8 @@ from face_plugin.params import SMALLEST_TILE
 __all__ = ["GIGABYTE", "available_memory", "fitting_tile_points", "tile_memory", "usable_cores"]
 
 GIGABYTE = 1e9
-# Measured (docs/scaling.md): an interpreter with this package loaded, and a point of a tile with its share of
-# halo.
+# Measured (docs/scaling.md): an interpreter with this package loaded, and a point of a tile with its share
+# of halo.
 PROCESS_BYTES = 0.25e9
 POINT_BYTES = 15e3
 

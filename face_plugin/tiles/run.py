@@ -21,10 +21,10 @@ from face_plugin.tiles.coarse import solve_coarse
 from face_plugin.tiles.engines import Engine, Job
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.solve import TILE_STAGES, solve_tile
-from face_plugin.tiles.sources import ArraySource, Source
+from face_plugin.tiles.sources import CHUNK, ArraySource, Source
 from face_plugin.tiles.store import Store
 
-__all__ = ["estimate_tiled", "solve_store"]
+__all__ = ["collect", "estimate_tiled", "solve_store", "tile_seconds"]
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,15 @@ def estimate_tiled(
         store, timings = solve_store(
             Path(folder), source, params, interior=filter_interior, engine=engine, progress=progress
         )
-        return gather(store, timings)
+        found = collect(store)
+        return Result(
+            normals=found["normals"],
+            strength=found["strength"],
+            confidence=found["confidence"],
+            interior=found.get("interior"),
+            timings={**timings, **tile_seconds(store)},
+            params=params,
+        )
 
 
 def solve_store(
@@ -89,6 +97,7 @@ def solve_store(
     interior: bool = False,
     engine: EngineLike = None,
     resume: bool = False,
+    chunk: int = CHUNK,
     progress: Progress | None = None,
 ) -> tuple[Store, dict[str, float]]:
     """Solve all tiles of a cloud in a folder.
@@ -104,6 +113,8 @@ def solve_store(
     engine : str, Engine or distributed.Client, optional
     resume : bool
         Go on from what the folder holds.
+    chunk : int
+        Points of the source held at once.
     progress : callable, optional
 
     Returns
@@ -134,7 +145,9 @@ def solve_store(
     points = tile_size(source.count, params)
     with make_engine(engine, params, points, source.count) as running:
         if store is None:
-            fill = partial(fill_store, folder, source, params, points, interior=interior, key=key)
+            fill = partial(
+                fill_store, folder, source, params, points, interior=interior, key=key, chunk=chunk
+            )
             store, voxels = timed("cloud", fill)
             timed("coarse", lambda: solve_coarse(voxels, params).save(folder))
             store.save()
@@ -173,23 +186,47 @@ def _run(engine: Engine, job: Job, store: Store, stage: str, report: Progress) -
     engine.run(job, str(store.folder), left, done)
 
 
-def gather(store: Store, timings: dict[str, float]) -> Result:
-    """Bring what the tiles say into the order of the input."""
+def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]:
+    """Bring what the tiles say into the order of the input.
+
+    Parameters
+    ----------
+    store : Store
+        All tiles done.
+    folder : Path, optional
+        Map the arrays from files there instead of holding them.
+
+    Returns
+    -------
+    dict of str to (n, ...) array
+        "normals", "strength", "confidence", and "interior" where the store asks for it.
+    """
+    kinds: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "normals": (store.dtype, (store.count, 3)),
+        "strength": (store.dtype, (store.count,)),
+        "confidence": (store.dtype, (store.count,)),
+    }
+    if store.interior:
+        kinds["interior"] = (np.bool_, (store.count,))
+
+    def empty(name: str) -> NDArray[Any]:
+        dtype, shape = kinds[name]
+        if folder is None:
+            return np.empty(shape, dtype)
+        return np.lib.format.open_memmap(folder / f"{name}.npy", "w+", dtype=dtype, shape=shape)
+
+    out = {name: empty(name) for name in kinds}
     rows = store.rows()
-    normals = np.empty((store.count, 3), dtype=store.dtype)
-    strength = np.empty(store.count, dtype=store.dtype)
-    seconds: NDArray[np.float64] = np.zeros(len(TILE_STAGES))
     for tile in range(store.tiles):
         row = rows[store.start[tile] : store.start[tile + 1]]
         found = store.read(tile, "field")
-        normals[row] = store.frame.unrotate(found["normals"])
-        strength[row] = found["strength"]
-        seconds += found["seconds"]
-    return Result(
-        normals=normals,
-        strength=strength,
-        confidence=np.ones(store.count, dtype=store.dtype),
-        interior=None,
-        timings={**timings, **dict(zip(TILE_STAGES, seconds.tolist(), strict=True))},
-        params=store.params,
-    )
+        found["normals"] = store.frame.unrotate(found["normals"])
+        for name, values in out.items():
+            values[row] = found[name]
+    return out
+
+
+def tile_seconds(store: Store) -> dict[str, float]:
+    """Seconds by stage that the tiles took, all together."""
+    seconds = sum(store.read(tile, "field")["seconds"] for tile in range(store.tiles))
+    return dict(zip(TILE_STAGES, np.asarray(seconds).tolist(), strict=True))

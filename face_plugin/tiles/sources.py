@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from face_plugin.errors import require
 from face_plugin.io.cloudfile import malformed
 
-__all__ = ["STREAMED", "ArraySource", "Source", "open_source"]
+__all__ = ["STREAMED", "ArraySource", "LasSource", "Source", "open_source"]
 
 CHUNK = 1_000_000
 """Points in a part."""
@@ -89,7 +89,7 @@ class _RecordSource:
         return _file_digest(self.path)
 
 
-class _LasSource:
+class LasSource:
     """LAS or LAZ, decompressed a part at a time."""
 
     def __init__(self, path: Path) -> None:
@@ -151,7 +151,7 @@ def open_source(path: Path) -> Source:
         return _open_npy(path)
     if suffix == ".ply":
         return _open_ply(path)
-    return _LasSource(path)
+    return LasSource(path)
 
 
 def _open_npy(path: Path) -> Source:
@@ -164,14 +164,17 @@ def _open_npy(path: Path) -> Source:
     if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
         found = f"{array.dtype} array of shape {array.shape}"
         raise malformed(path, "NPY", f"{found}, expected numbers of shape (n, 3) or more columns")
-    return ArraySource(array[:, :3])
+    # Columns 4 to 6 of an array are its normals by common use, which the new ones replace.
+    rest = range(6 if array.shape[1] >= 6 else 3, array.shape[1])
+    return ArraySource(array[:, :3], {f"column_{k + 1}": array[:, k] for k in rest})
 
 
 def _open_ply(path: Path) -> Source:
     from plyfile import PlyData, PlyParseError
 
     try:
-        # Without lists, plyfile maps a binary element into memory; the faces of a mesh it would read at once.
+        # Without lists, plyfile maps a binary element into memory; the faces of a mesh it would read at
+        # once.
         data = PlyData.read(str(path), known_list_len={"face": {"vertex_indices": 3, "vertex_index": 3}})
         vertex = data["vertex"].data
     except (PlyParseError, ValueError, KeyError, OverflowError) as error:

@@ -1,0 +1,194 @@
+"""Clouds larger than memory: a file in, a file with normals out, only parts in between."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.io.cloudfile import replacing
+from face_plugin.params import Params
+from face_plugin.solver import Progress
+from face_plugin.tiles.choose import EngineLike, allowed_memory
+from face_plugin.tiles.run import collect, solve_store
+from face_plugin.tiles.sinks import WRITERS, Columns
+from face_plugin.tiles.sources import STREAMED, Source, open_source
+
+__all__ = ["FileResult", "normals_of_file", "streams", "work_folder"]
+
+log = logging.getLogger(__name__)
+
+# Bytes that a point takes in memory on the way from one file to another, with a few attributes.
+HELD_BYTES = 300
+# Points in a part: a part takes about a hundred bytes a point on its way, a few times over.
+PART_BYTES = 1_000
+PART_POINTS = (20_000, 1_000_000)
+
+_NORMALS_OF_OLD = {"nx", "ny", "nz", "NormalX", "NormalY", "NormalZ"}
+
+
+@dataclass(frozen=True)
+class FileResult:
+    """What was done to a file."""
+
+    points: int
+    """Points read."""
+    written: int
+    """Points written."""
+    interior: int | None
+    """Points inside the object, where they were classified."""
+    mean_confidence: float
+    timings: dict[str, float]
+    """Seconds by stage."""
+    params: Params
+
+
+def work_folder(output: Path) -> Path:
+    """Folder beside the output in which the tiles of a run are kept."""
+    return output.with_name(f".{output.name}.face")
+
+
+def streams(source: Path, output: Path, params: Params) -> bool:
+    """Whether a file is too large for the memory allowed and can be worked on in parts.
+
+    Examples
+    --------
+    >>> streams(Path("cloud.xyz"), Path("cloud.ply"), Params())
+    False
+    """
+    if source.suffix.lower() not in STREAMED or output.suffix.lower() not in STREAMED:
+        return False
+    return open_source(source).count * HELD_BYTES > allowed_memory(params)
+
+
+def normals_of_file(
+    source: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    params: Params | None = None,
+    *,
+    filter_interior: bool = False,
+    mark_interior: bool = False,
+    scalars: bool = False,
+    engine: EngineLike = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> FileResult:
+    """Estimate the normals of a cloud that need not fit into memory.
+
+    The work is kept in a folder beside the output, named as `work_folder` says, and removed with the last
+    byte written. If the run is interrupted it stays, and `resume` goes on from there.
+
+    Parameters
+    ----------
+    source, output : path
+        NPY, binary PLY, LAS or LAZ, of the same kind or not. The point attributes are kept where the
+        output's format can hold them; other elements of a PLY, such as faces, are not.
+    params : Params, optional
+    filter_interior : bool
+        Leave out the points inside the object.
+    mark_interior : bool
+        Write whether each point is inside, as ``interior`` (0 or 1).
+    scalars : bool
+        Write ``strength`` and ``confidence`` of each point.
+    engine : str, Engine or distributed.Client, optional
+    resume : bool
+        Go on from what an interrupted run left.
+    progress : callable, optional
+
+    Returns
+    -------
+    FileResult
+
+    Raises
+    ------
+    ValueError
+        A file that cannot be read or written in parts; or, with `resume`, work on another input or with
+        other settings.
+    OSError
+        A file cannot be opened or written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from face_plugin.shapes import sphere
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> np.save(folder / "ball.npy", sphere(3000).points)
+    >>> params = Params(tile_points=1500, engine="serial")
+    >>> normals_of_file(folder / "ball.npy", folder / "ball.ply", params).written
+    3000
+    """
+    source, output, params = Path(source), Path(output), params or Params()
+    if output.suffix.lower() not in WRITERS:
+        raise ValueError(f"{output}: cannot be written in parts; allowed are {', '.join(WRITERS)}")
+    report = progress or (lambda stage, fraction: None)
+    opened = open_source(source)
+    chunk = int(np.clip(allowed_memory(params) / 4 / PART_BYTES, *PART_POINTS))
+    folder = work_folder(output)
+    if folder.exists() and not resume:
+        shutil.rmtree(folder)
+    folder.mkdir(exist_ok=True)
+    interior = filter_interior or mark_interior
+    try:
+        store, timings = solve_store(
+            folder, opened, params, interior=interior, engine=engine, resume=resume, progress=progress,
+            chunk=chunk
+        )
+        report("write", 0.0)
+        found = collect(store, folder)
+        inside = found["interior"] if interior else None
+        written = opened.count
+        if filter_interior and inside is not None:
+            written -= int(np.count_nonzero(inside))
+        extra = [name for name, wanted in _extras(scalars, mark_interior) if wanted]
+        parts = _parts(opened, found, extra, filter_interior, chunk)
+        with replacing(output) as temporary:
+            WRITERS[output.suffix.lower()](temporary, written, parts, opened)
+        report("write", 1.0)
+    except BaseException:
+        if (folder / "store.json").exists():
+            log.warning("what was done is kept in %s for --resume", folder)
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    result = FileResult(
+        points=opened.count,
+        written=written,
+        interior=None if inside is None else int(np.count_nonzero(inside)),
+        mean_confidence=float(found["confidence"].mean()),
+        timings=timings,
+        params=params,
+    )
+    del found, inside, parts
+    shutil.rmtree(folder)
+    return result
+
+
+def _extras(scalars: bool, mark_interior: bool) -> list[tuple[str, bool]]:
+    return [("strength", scalars), ("confidence", scalars), ("interior", mark_interior)]
+
+
+def _parts(
+    source: Source, found: dict[str, NDArray[Any]], extra: list[str], drop_interior: bool, chunk: int
+) -> Iterator[Columns]:
+    """Columns to write, a part of the input at a time."""
+    seen = 0
+    for points, attributes in source.parts(chunk):
+        part = slice(seen, seen + len(points))
+        columns: Columns = {axis: points[:, k] for k, axis in enumerate("xyz")}
+        columns.update({f"n{axis}": found["normals"][part, k] for k, axis in enumerate("xyz")})
+        columns.update({k: v for k, v in attributes.items() if k not in _NORMALS_OF_OLD})
+        for name in extra:
+            values = found[name][part]
+            columns[name] = values.astype(np.uint8) if values.dtype == np.bool_ else values
+        if drop_interior:
+            keep = ~found["interior"][part]
+            columns = {name: values[keep] for name, values in columns.items()}
+        seen += len(points)
+        yield columns

@@ -1,0 +1,244 @@
+"""Tiles from end to end: the same answers as in one piece, whoever solves them and in whatever order."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from face_plugin import FaceError, Params, estimate_normals
+from face_plugin.shapes import demo_shape, sphere
+from face_plugin.tiles import estimate_tiled, in_tiles
+from face_plugin.tiles.choose import make_engine
+from face_plugin.tiles.engines import Processes, Serial
+from face_plugin.tiles.solve import solve_tile
+
+PARAMS = Params(tile_points=1000, engine="serial")
+
+
+@pytest.fixture(scope="module")
+def shape():
+    return demo_shape(4000)
+
+
+@pytest.fixture(scope="module")
+def serial(shape):
+    return estimate_tiled(shape.points, PARAMS)
+
+
+def same(a, b):
+    return np.einsum("ij,ij->i", a, b) > 0
+
+
+def equal(a, b):
+    return all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("normals", "strength", "confidence"))
+
+
+def test_normals_of_one_piece(shape, serial):
+    one = estimate_normals(shape.points, Params())
+    outside = ~shape.interior
+    # Two seeds of the solve in one piece agree on 99.9 % of the visible points of this shape.
+    assert same(one.normals, serial.normals)[outside].mean() > 0.998
+    assert same(shape.normals, serial.normals)[outside].mean() > 0.998
+    # The strength at a ball depends on the size of the tetrahedra, which the octree of each box fixes within
+    # a factor of two only; measured here: 0.78 of that in one piece.
+    visible = outside & (one.strength > 0.05)
+    assert 0.6 < np.median(serial.strength[visible] / one.strength[visible]) < 1.6
+
+
+class Killing(Processes):
+    """Processes, one of which is killed in the middle."""
+
+    killed = 0
+
+    def run(self, job, folder, tiles, done):
+        def and_kill(tile):
+            done(tile)
+            if not self.killed:
+                self.killed = next(iter(self._pool._processes))
+                os.kill(self.killed, signal.SIGKILL)
+
+        super().run(job, folder, tiles, and_kill)
+
+
+def test_a_killed_process_changes_nothing(shape, serial):
+    engine = Killing(2)
+    result = estimate_tiled(shape.points, PARAMS, engine=engine)
+    assert engine.killed
+    assert equal(result, serial)
+
+
+
+def _die(folder, tile):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _fail(folder, tile):
+    raise ValueError(f"tile {tile}")
+
+
+def test_processes_that_die_again_and_again_end_the_run():
+    with Processes(2) as engine, pytest.raises(FaceError, match=r"died 3 times .*tile_points"):
+        engine.run(_die, "", [0, 1, 2], print)
+    with Processes(1) as engine, pytest.raises(ValueError, match="tile 0"):
+        engine.run(_fail, "", [0, 1, 2], print)
+
+
+def test_a_script_needs_no_main_guard(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        textwrap.dedent(
+            """
+            print("started")
+            from face_plugin import Params, estimate_normals
+            from face_plugin.shapes import sphere
+            ball = sphere(2500)
+            result = estimate_normals(ball.points, Params(tile_points=1250, engine="processes", workers=2))
+            print(((result.normals * ball.normals).sum(axis=1) > 0).mean())
+            """
+        )
+    )
+    out = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
+    assert out.stdout.split() == ["started", "1.0"]
+
+
+def test_dask_with_a_worker_killed(shape, serial):
+    distributed = pytest.importorskip("distributed")
+    killed = []
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+
+        def kill(stage, fraction):
+            if stage == "tiles" and fraction > 0 and not killed:
+                killed.append(fraction)
+                os.kill(pids[0], signal.SIGKILL)
+
+        result = estimate_tiled(shape.points, PARAMS, engine=client, progress=kill)
+        assert killed
+        assert killed[0] < 1
+        assert equal(result, serial)
+        # The address of a scheduler will do as well, in the settings: that is how a host passes it.
+        small = sphere(2500).points
+        by_address = estimate_normals(small, Params(tile_points=1250, engine=cluster.scheduler_address))
+        assert equal(by_address, estimate_normals(small, Params(tile_points=1250, engine="serial")))
+
+
+def test_the_order_of_the_points_does_not_matter(shape, serial):
+    order = np.random.default_rng(0).permutation(len(shape.points))
+    result = estimate_tiled(shape.points[order], PARAMS)
+    assert np.allclose(result.normals, serial.normals[order], rtol=0, atol=1e-6)
+
+
+def test_input_types_and_repeated_points():
+    ball = sphere(2000)
+    points = ball.points[np.r_[0:2000, 0:500]].astype(np.float32)
+    result = estimate_tiled(points, Params(tile_points=1250, engine="serial"))
+    assert result.normals.dtype == np.float32
+    assert np.array_equal(result.normals[:500], result.normals[2000:])
+    assert same(result.normals[:2000], ball.normals).all()
+    whole = np.rint(ball.points * 1000).astype(int)
+    assert same(estimate_tiled(whole, Params(tile_points=1000, engine="serial")).normals, ball.normals).all()
+
+
+def test_a_tile_of_copies_of_one_stray_point():
+    ball = sphere(1200)
+    points = np.r_[ball.points, np.full((1100, 3), 4.0)]
+    result = estimate_tiled(points, Params(tile_points=1000, engine="serial"))
+    assert same(result.normals[:1200], ball.normals).mean() > 0.99
+    assert np.isfinite(result.normals).all()
+    assert np.allclose(np.linalg.norm(result.normals, axis=1), 1.0)
+
+
+def test_a_dense_patch_beside_a_sparse_rest():
+    """Spacings that differ by ten next to each other, as where a scanner came near."""
+    ball = sphere(3000)
+    rng = np.random.default_rng(0)
+    dense = [*rng.normal(scale=0.1, size=(4000, 3)), 0.0, 0.0, 1.0]
+    dense[:, 2] = np.sqrt(1 - dense[:, 0] ** 2 - dense[:, 1] ** 2)
+    points = np.concatenate([ball.points, dense])
+    result = estimate_tiled(points, Params(tile_points=1500, engine="serial"))
+    # Uniform random points leave pairs that nearly touch; in one piece 99.9 % are right as well.
+    assert same(result.normals, points).mean() > 0.995
+
+
+def test_bad_input_is_judged_as_in_one_piece():
+    with pytest.raises(ValueError, match=r"points must have the shape \(n, 3\)"):
+        estimate_tiled(np.zeros((5, 2)), PARAMS)
+    bad = sphere(3000).points
+    bad[7] = np.nan
+    with pytest.raises(ValueError, match=r"found NaN or infinity in 1 of 3000 rows: 7"):
+        estimate_tiled(bad, PARAMS)
+    line = np.arange(3000.0)[:, None] * np.array([[1.0, 2.0, 3.0]])
+    with pytest.raises(ValueError, match="must not all lie on one line"):
+        estimate_tiled(line, PARAMS)
+
+
+def test_engines_by_name():
+    assert isinstance(make_engine("serial", Params(), 1000, 5000), Serial)
+    assert isinstance(make_engine(None, Params(engine="processes", workers=3), 1000, 5000), Processes)
+    assert make_engine("processes", Params(workers=8, max_memory=16.0), 1000, 3000).workers == 3
+    # 0.6 GB hold this process and one more.
+    assert make_engine("processes", Params(workers=8, max_memory=0.6), 1000, 9000).workers == 1
+    assert isinstance(make_engine("auto", Params(workers=1), 1000, 9000), Serial)
+    own = Serial()
+    assert make_engine(own, Params(), 1000, 5000) is own
+    with pytest.raises(ValueError, match="engine must be"):
+        make_engine("threads", Params(), 1000, 5000)
+    with pytest.raises(ValueError, match="engine must be"):
+        make_engine(3, Params(), 1000, 5000)
+
+
+def test_which_clouds_are_tiled():
+    assert not in_tiles(1000, Params(tile_points=1000))
+    assert in_tiles(1001, Params(tile_points=1000))
+    assert in_tiles(10_000_000, Params())
+    assert in_tiles(40_000, Params(max_memory=0.5))
+    assert not in_tiles(40_000, Params(max_memory=8.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"tile_points": 10}, "tile_points must be an integer >= 1000, found 10"),
+        ({"tile_points": 2e4}, "tile_points must be an integer"),
+        ({"max_memory": -1.0}, "max_memory must be in"),
+        ({"workers": 0}, "workers must be an integer >= 1, found 0"),
+        ({"engine": "spark"}, "engine must be one of"),
+    ],
+)
+def test_settings_out_of_range(changes, message):
+    with pytest.raises(ValueError, match=message):
+        Params(**changes)
+
+
+def test_less_memory_than_a_tile_needs():
+    with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d+ GB, found 0\.10"):
+        estimate_tiled(sphere(3000).points, Params(tile_points=1000, max_memory=0.1))
+
+
+def test_progress_counts_the_tiles():
+    seen = []
+    estimate_tiled(sphere(3000).points, PARAMS, progress=lambda stage, done: seen.append((stage, done)))
+    tiles = [done for stage, done in seen if stage == "tiles"]
+    assert tiles == sorted(tiles)
+    assert len(set(tiles)) == 4
+    for stage in ("cloud", "coarse", "tiles"):
+        assert (stage, 0.0) in seen
+        assert (stage, 1.0) in seen
+
+
+def test_a_tile_done_is_not_solved_again(tmp_path, monkeypatch):
+    from face_plugin.tiles.run import solve_store
+    from face_plugin.tiles.sources import ArraySource
+
+    source = ArraySource(sphere(2500).points)
+    store, _ = solve_store(tmp_path, source, Params(tile_points=1250), engine="serial")
+    before = store.path(0, "field").stat().st_mtime_ns
+    assert solve_tile(str(tmp_path), 0) == 0
+    assert store.path(0, "field").stat().st_mtime_ns == before

@@ -8,6 +8,7 @@ where, how large and how rotated the object is.
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -157,7 +158,13 @@ def prepare(points: ArrayLike) -> Cloud:
     flat_tolerance = max(FLAT_TOLERANCE, 4 * rounding)
     if extent[1] <= flat_tolerance:
         raise ValueError("points must not all lie on one line: a line has no normal")
+    # The box along the input's axes has served; that along the canonical ones turns with the points.
     work = work @ axes.T
+    lower, upper = work.min(axis=0), work.max(axis=0)
+    diagonal = float(np.linalg.norm(upper - lower))
+    centre = 0.5 * (lower + upper)
+    work = (work - centre) / diagonal
+    frame = Frame(origin + scale * (centre @ axes), axes, scale * diagonal)
     order, leads = morton_distinct(work)
     distinct = work[order[leads]]
     if len(distinct) < MINIMUM_POINTS:
@@ -173,7 +180,7 @@ def prepare(points: ArrayLike) -> Cloud:
     flat = bool(extent[2] <= flat_tolerance)
     if flat:
         log.warning("all points lie in one plane: the side that their normals point to is arbitrary")
-    return Cloud(distinct, rows, Frame(origin, axes, scale), array.dtype, flat)
+    return Cloud(distinct, rows, frame, array.dtype, flat)
 
 
 def _extent(array: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
@@ -184,8 +191,9 @@ def _extent(array: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
         longest = float(side.max())
         if longest == 0.0:
             raise ValueError(f"points must be distinct, found {len(array)} points at one place")
-        diagonal = longest * float(np.linalg.norm(side / longest)) if np.isfinite(longest) else np.inf
-    if not np.isfinite(diagonal):
+        diagonal = longest * float(np.linalg.norm(side / longest)) if math.isfinite(longest) else math.inf
+    # Twice: the box along other axes is longer, by sqrt(3) at most.
+    if not math.isfinite(2 * diagonal):
         raise ValueError("points must span a finite length, found coordinates whose difference overflows")
     return 0.5 * lower + 0.5 * upper, diagonal
 

@@ -2,6 +2,8 @@
 
 import copy
 import logging
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -163,3 +165,21 @@ def test_a_tensor_cloud_gives_a_tensor_mesh():
     assert len(densities) == mesh.vertex.positions.shape[0]
     surface = reconstruct(SHAPE.points.astype(np.float32), **options)
     assert np.allclose(mesh.vertex.positions.numpy(), surface.vertices, atol=1e-6)
+
+
+def test_adapters_import_without_their_hosts():
+    code = """
+import sys
+for host in ("open3d", "pymeshlab", "pyvista", "trimesh", "pdal"):
+    sys.modules[host] = None  # what an import finds where it is not installed
+from face_plugin.adapters import open3d, pdal, pymeshlab, pyvista, trimesh
+from face_plugin.errors import MissingDependencyError
+for call, extra in ((open3d.install, "open3d"), (pymeshlab.register, "pymeshlab")):
+    try:
+        call()
+    except MissingDependencyError as error:
+        assert f"pip install 'face-plugin[{extra}]'" in str(error)
+    else:
+        raise AssertionError(extra)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

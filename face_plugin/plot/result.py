@@ -79,14 +79,14 @@ def plot_result(
     strengths = np.asarray(strengths, dtype=np.float64)
     camera = Camera.around(points, view=view, up=up)
     spacing = spacing_of(points)
-    figure = new_figure(plt, 15.6, 6.1, title)
-    box = {"left": 0.01, "right": 0.985, "bottom": 0.16, "top": 0.88, "wspace": 0.1}
+    figure = new_figure(plt, 15.6, 6.6, title)
+    box = {"left": 0.01, "right": 0.985, "bottom": 0.22, "top": 0.89, "wspace": 0.1}
     left, middle, right = figure.subplots(1, 3, gridspec_kw={"width_ratios": [1, 1, 1.12], **box})
     norm = plt.Normalize(0.0, max(float(np.quantile(strengths, TOP)), 1e-12))
     colours = plt.colormaps["viridis"](norm(strengths))[:, :3]
     balls = render_points(points, colours, radius=0.8 * spacing, camera=camera, size=pixels)
     show(left, balls, "Field strength at the points")
-    _colour_bar(figure, left, plt.ScalarMappable(norm, "viridis"), below=-0.05)
+    _colour_bar(figure, left, plt.ScalarMappable(norm, "viridis"))
     painted = 0.5 + 0.5 * normals
     discs = render_points(points, painted, radius=1.5 * spacing, normals=normals, camera=camera, size=pixels)
     show(middle, discs, "Normals by direction")
@@ -114,10 +114,11 @@ def field_within(face: FaCE) -> Callable[[Array], Array]:
     return field
 
 
-def _colour_bar(figure: Any, axes: Any, mappable: Any, *, below: float) -> None:
-    bar = figure.colorbar(
-        mappable, cax=axes.inset_axes((0.1, below, 0.8, 0.03)), orientation="horizontal", extend="max"
-    )
+def _colour_bar(figure: Any, axes: Any, mappable: Any) -> None:
+    # At one height under all panels, however tall the object is.
+    left, _, width, _ = axes.get_position(original=True).bounds
+    bar_axes = figure.add_axes((left + 0.12 * width, 0.105, 0.76 * width, 0.022))
+    bar = figure.colorbar(mappable, cax=bar_axes, orientation="horizontal", extend="max")
     bar.set_label(r"$E_{\max}$  (unshielded space has 1)")
     bar.outline.set_visible(False)
 
@@ -158,4 +159,4 @@ def _draw_slice(
     level = "" if alpha is None else f", line at {alpha:g}"
     axes.set(xlabel=across, ylabel=upward, title=f"Slice of $E_{{\\max}}$ at {where(section, points)}{level}")
     axes.spines[:].set_visible(False)
-    _colour_bar(figure, axes, drawn, below=-0.19)
+    _colour_bar(figure, axes, drawn)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 
+import distributed
 import numpy as np
 import pytest
 
@@ -106,7 +107,6 @@ def test_a_script_needs_no_main_guard(tmp_path):
 
 
 def test_dask_with_a_worker_killed(shape, serial):
-    distributed = pytest.importorskip("distributed")
     killed = []
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,

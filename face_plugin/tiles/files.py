@@ -147,7 +147,7 @@ def normals_of_file(
         if filter_interior and inside is not None:
             written -= int(np.count_nonzero(inside))
         extra = [name for name, wanted in _extras(scalars, mark_interior) if wanted]
-        parts = _parts(opened, found, extra, filter_interior, chunk)
+        parts = columns_of(opened, found, extra, drop_interior=filter_interior, chunk=chunk)
         with replacing(output) as temporary:
             WRITERS[output.suffix.lower()](temporary, written, parts, opened)
         report("write", 1.0)
@@ -174,10 +174,21 @@ def _extras(scalars: bool, mark_interior: bool) -> list[tuple[str, bool]]:
     return [("strength", scalars), ("confidence", scalars), ("interior", mark_interior)]
 
 
-def _parts(
-    source: Source, found: dict[str, NDArray[Any]], extra: list[str], drop_interior: bool, chunk: int
+def columns_of(
+    source: Source, found: dict[str, NDArray[Any]], extra: list[str], *, drop_interior: bool, chunk: int
 ) -> Iterator[Columns]:
-    """Columns to write, a part of the input at a time."""
+    """Yield the columns to write, `chunk` points of the input at a time.
+
+    Parameters
+    ----------
+    source : Source
+    found : dict of str to (n, ...) array
+        As `face_plugin.tiles.run.collect` gives it.
+    extra : list of str
+        Names of what is to be written beside the normals.
+    drop_interior : bool
+    chunk : int
+    """
     seen = 0
     for points, attributes in source.parts(chunk):
         part = slice(seen, seen + len(points))

@@ -27,12 +27,32 @@ def run_filter_script(ms: Any, path: str | os.PathLike[str]) -> None:
         The file cannot be read, or is no filter script.
     PyMeshLabException
         A step failed; the message names its number (from 1) and its filter.
+
+    Examples
+    --------
+    >>> import pathlib, pymeshlab, tempfile
+    >>> from face_plugin.shapes import sphere
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "script.mlx"
+    >>> step = '<filter name="Compute Normal by Faraday Cage"/>'
+    >>> _ = path.write_text(f"<!DOCTYPE FilterScript><FilterScript>{step}</FilterScript>")
+    >>> ms = pymeshlab.MeshSet()
+    >>> ms.add_mesh(pymeshlab.Mesh(sphere(300).points))
+    >>> run_filter_script(ms, path)
     """
     _run(ms, read_steps(path), _host("apply_filter_script"))
 
 
 def register() -> None:
-    """Make the filters methods of every MeshSet, known to ``apply_filter`` and ``apply_filter_script``."""
+    """Make the filters methods of every MeshSet, known to ``apply_filter`` and ``apply_filter_script``.
+
+    Examples
+    --------
+    >>> import pymeshlab
+    >>> register()
+    >>> hasattr(pymeshlab.MeshSet, "compute_normal_by_faraday_cage")
+    True
+    >>> unregister()
+    """
     mesh_set = require("pymeshlab", extra="pymeshlab").MeshSet
     if _originals:
         return

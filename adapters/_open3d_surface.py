@@ -39,6 +39,15 @@ def create_from_point_cloud_face(
         With vertex normals, and with colours where the points have them: those of the nearest point kept.
     densities : open3d.utility.DoubleVector
         Sampling density at the vertices.
+
+    Examples
+    --------
+    >>> import open3d
+    >>> from face_plugin.shapes import sphere
+    >>> pcd = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(sphere(300).points))
+    >>> mesh, densities = create_from_point_cloud_face(pcd, depth=5)
+    >>> mesh.is_watertight()
+    True
     """
     o3d = require("open3d", extra="open3d")
     middle: list[Filter] = [Interior()] if filter_interior else []

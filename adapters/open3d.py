@@ -102,6 +102,15 @@ def remove_interior_points(
         New cloud of the same type.
     index : list of int, or for a tensor cloud a Boolean mask
         The points kept, as ``remove_statistical_outlier`` and ``remove_statistical_outliers`` give them.
+
+    Examples
+    --------
+    >>> import open3d
+    >>> from face_plugin.shapes import sphere
+    >>> pcd = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(sphere(300).points))
+    >>> kept, index = remove_interior_points(pcd)
+    >>> len(kept.points) == len(index)
+    True
     """
     keep = np.ones(len(points_of(pcd)), dtype=np.bool_)
     if not is_empty(pcd):

@@ -63,6 +63,14 @@ def remove_interior(ins: Dimensions, outs: MutableMapping[str, NDArray[Any]]) ->
     """Drop the points inside the object, by PDAL's output dimension Mask; the others keep all they have.
 
     Parameters and errors are those of `estimate_normals`; no dimension has to be added.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import nested_box
+    >>> x, y, z = nested_box(900).points.T
+    >>> outs = {}
+    >>> remove_interior({"X": x, "Y": y, "Z": z}, outs), list(outs)
+    (True, ['Mask'])
     """
     return _run(ins, outs, Interior())
 
@@ -80,6 +88,10 @@ def configured(
         Drop interior points.
     **settings
         Fields of `face_plugin.Params`.
+
+    Examples
+    --------
+    >>> step = configured(interior=True, alpha="sparse")
     """
     params = Params(**settings)
     steps: list[Filter] = [Normals(params)] if normals else []

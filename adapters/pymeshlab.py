@@ -44,6 +44,16 @@ def compute_normal_by_faraday_cage(ms: Any, **parameters: Any) -> None:
         Change the normals of the selected vertices only; all of them conduct.
     alpha, cage_spacing, ...
         Settings of `face_plugin.Params`.
+
+    Examples
+    --------
+    >>> import pymeshlab
+    >>> from face_plugin.shapes import sphere
+    >>> ms = pymeshlab.MeshSet()
+    >>> ms.add_mesh(pymeshlab.Mesh(sphere(300).points))
+    >>> compute_normal_by_faraday_cage(ms, cage_spacing=pymeshlab.PercentageValue(1))
+    >>> ms.current_mesh().vertex_normal_matrix().shape
+    (300, 3)
     """
     apply_by_name(ms, "compute_normal_by_faraday_cage", parameters)
 
@@ -58,6 +68,16 @@ def compute_selection_by_faraday_interior(ms: Any, **parameters: Any) -> None:
     ms : pymeshlab.MeshSet
     alpha, cage_spacing, ...
         Settings of `face_plugin.Params`.
+
+    Examples
+    --------
+    >>> import pymeshlab
+    >>> from face_plugin.shapes import sphere
+    >>> ms = pymeshlab.MeshSet()
+    >>> ms.add_mesh(pymeshlab.Mesh(sphere(300).points))
+    >>> compute_selection_by_faraday_interior(ms)
+    >>> ms.current_mesh().selected_vertex_number()
+    0
     """
     apply_by_name(ms, "compute_selection_by_faraday_interior", parameters)
 
@@ -72,6 +92,16 @@ def compute_scalar_by_faraday_strength(ms: Any, **parameters: Any) -> None:
         Change the scalars of the selected vertices only.
     cage_spacing, ...
         Settings of `face_plugin.Params`.
+
+    Examples
+    --------
+    >>> import pymeshlab
+    >>> from face_plugin.shapes import sphere
+    >>> ms = pymeshlab.MeshSet()
+    >>> ms.add_mesh(pymeshlab.Mesh(sphere(300).points))
+    >>> compute_scalar_by_faraday_strength(ms)
+    >>> ms.current_mesh().has_vertex_scalar()
+    True
     """
     apply_by_name(ms, "compute_scalar_by_faraday_strength", parameters)
 
@@ -89,5 +119,15 @@ def generate_surface_reconstruction_faraday(ms: Any, **parameters: Any) -> None:
         As in `face_plugin.reconstruct`.
     alpha, cage_spacing, ...
         Settings of `face_plugin.Params`.
+
+    Examples
+    --------
+    >>> import pymeshlab
+    >>> from face_plugin.shapes import sphere
+    >>> ms = pymeshlab.MeshSet()
+    >>> ms.add_mesh(pymeshlab.Mesh(sphere(300).points))
+    >>> generate_surface_reconstruction_faraday(ms, depth=5)
+    >>> ms.current_mesh().label()
+    'Faraday mesh'
     """
     apply_by_name(ms, "generate_surface_reconstruction_faraday", parameters)

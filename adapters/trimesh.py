@@ -61,6 +61,13 @@ def reconstruct(geometry: Any, params: Params | None = None, **options: Any) -> 
     trimesh.Trimesh
         With the vertices as they were reconstructed: none are merged or dropped. The attribute
         ``densities`` of its ``vertex_attributes`` is there where the host that reconstructs gives it.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from face_plugin.shapes import sphere
+    >>> reconstruct(trimesh.PointCloud(sphere(300).points), depth=5).is_watertight
+    True
     """
     trimesh = require("trimesh", extra="trimesh")
     surface = solver.reconstruct(points_of(geometry), params, **options)

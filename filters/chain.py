@@ -103,6 +103,14 @@ class Chain(Filter):
         ------
         ValueError
             Another extension, a malformed file, or a step that cannot be; the message names file and step.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> path = tempfile.mkdtemp() + "/chain.toml"
+        >>> Chain([Thin(0.01), Normals()]).save(path)
+        >>> [step.name for step in Chain.load(path).steps]
+        ['thin', 'normals']
         """
         path = Path(path)
         # The standard library reads TOML from Python 3.11 on; tomli is the same parser for 3.10.

@@ -1,9 +1,11 @@
+import json
 import logging
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from face_plugin.cli import main
 from face_plugin.io import read_cloud, write_mesh
 from face_plugin.ribbons import (
     Samples,
@@ -393,3 +395,52 @@ def test_outward_normals_of_a_sketch(sparse):
     np.testing.assert_allclose(np.linalg.norm(at_vertices, axis=1), 1.0)
     assert aligned(sketch.vertices, at_vertices) > 0.985
     np.testing.assert_array_equal(at_vertices[0::3], at_vertices[1::3])
+
+
+def test_command_makes_a_closed_mesh_without_dents(tmp_path, capsys):
+    sketch = teapot_sketch()
+    path, mesh, oriented = tmp_path / "in.ply", tmp_path / "out.ply", tmp_path / "oriented.ply"
+    write_mesh(path, sketch.vertices, sketch.faces, normals=sketch.normals)
+    arguments = [
+        "ribbons",
+        path,
+        "-o",
+        mesh,
+        "--points",
+        "4000",
+        "--depth",
+        "7",
+        "--normals",
+        oriented,
+        "--json",
+    ]
+    assert main([str(argument) for argument in arguments]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["strokes"] == sketch.stroke_count
+    assert summary["points"] == 4000
+    cloud = read_cloud(mesh)
+    vertices, faces = cloud.points, cloud.source["face"].data["vertex_indices"]
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = (np.sort(a * np.int64(len(vertices)) + b) for a, b in (edges.T, edges.T[::-1]))
+    np.testing.assert_array_equal(there, back)
+    corners = vertices[faces].astype(float)
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    # Body 2.83, and what handle, spout and legs add outside of it; measured 3.14 to 3.16.
+    assert 3.0 < volume < 3.3
+    level = np.min([solid.level(vertices) for solid in teapot_solids()], axis=0)
+    # Unfiltered, the legs' ends inside the body leave dents and bubbles 0.59 deep. Filtered, measured over four
+    # drawings: 0.014 to 0.027 below the union and 0.052 to 0.060 above it, in the fillets of the joints.
+    assert level.min() > -0.06
+    assert level.max() < 0.1
+    normals = read_cloud(oriented).normals
+    assert len(normals) == len(sketch.vertices)
+
+
+def test_command_says_what_is_wrong(tmp_path, capsys):
+    path = tmp_path / "in.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
+    output = tmp_path / "out.ply"
+    assert main(["ribbons", str(path), "-o", str(output)]) == 2
+    assert "width: the file has none" in capsys.readouterr().err
+    assert main(["ribbons", str(path), "-o", str(output), "--points", "5", "--spacing", "1"]) == 2
+    assert not output.exists()

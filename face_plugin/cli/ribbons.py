@@ -12,6 +12,7 @@ from face_plugin.cli.options import (
     add_command,
     add_interior,
     add_method,
+    add_sculpt,
     add_surface,
     params_of,
     surface_of,
@@ -51,6 +52,7 @@ def register(commands: Any) -> None:
         help=f"also write the sketch with outward normals at its own vertices ({', '.join(_SUFFIXES)})",
     )
     add_interior(parser, default=True)
+    add_sculpt(parser)
     add_surface(parser)
     add_method(parser)
 
@@ -71,6 +73,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         samples.points,
         params,
         filter_interior=args.filter_interior,
+        sculpt=args.sculpt,
         progress=console.progress,
         **surface_of(args),
     )

@@ -70,7 +70,7 @@ def test_sample_arguments(arguments, message):
 def test_sparsify_removes_every_other_stroke():
     sketch = teapot_sketch()
     half = sparsify(sketch)
-    # 64 strokes in seven or so components, each of which keeps its first.
+    # 36 of 64: each component keeps its first.
     assert 0.5 <= half.stroke_count / sketch.stroke_count < 0.6
     # Body rings are drawn first, one after the other: of those 0, 2, 4, ... stay.
     heights = [np.ptp(sketch.vertices[sketch.vertex_strokes == k][:, 2]) for k in (0, 2, 4)]
@@ -181,8 +181,8 @@ def test_command_makes_a_closed_mesh_without_dents(tmp_path, capsys):
     assert 3.0 < volume < 3.3
     level = np.min([solid.level(vertices) for solid in teapot_solids()], axis=0)
     # Unfiltered, the legs' ends inside the body leave dents and bubbles 0.59 deep. Filtered at alpha 0.01,
-    # five drawings: up to 0.060 above the union, in the fillets of the joints, and 0.027 below it in four; in the
-    # fifth (seed 3) three points at the spout stay and leave a dent of 0.146. At 0.02 none stay.
+    # five drawings: up to 0.060 above the union, in the fillets of the joints, and 0.027 below it in four; in
+    # the fifth (seed 3) three points at the spout stay and leave a dent of 0.146. At 0.02 none stay.
     assert level.min() > -0.06
     assert level.max() < 0.1
     normals = read_cloud(oriented).normals

@@ -201,8 +201,8 @@ def test_estimated_normals_follow_a_curved_drawing(tmp_path):
     sketch = read_sketch(path)
     brush = body.normals[::3]
     cosine = np.abs(np.einsum("ij,ij->i", sketch.normals[::3], brush))
-    # Measured: median 0.99997, the lowest 5 % at 0.998, none below 0.95; the outer rings have neighbours on one
-    # side only.
+    # Measured: median 0.99997, the lowest 5 % at 0.998, none below 0.95; the outer rings have neighbours on
+    # one side only.
     assert np.median(cosine) > 0.999
     assert cosine.min() > 0.95
 

@@ -63,7 +63,7 @@ def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArr
     points : (n, 3) float64
     cage_spacing : float or None
         The same for all, in the points' unit; None = half the distance to the 8th neighbour, which removes
-        near-duplicates and keeps even samplings.
+        near-duplicates and keeps even samplings, and 0 for fewer points than that.
 
     Examples
     --------
@@ -72,7 +72,9 @@ def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArr
     """
     if cage_spacing is not None:
         return np.full(len(points), cage_spacing)
-    eighth = cKDTree(points).query(points, k=[min(9, len(points))], workers=-1)[0][:, 0]
+    if len(points) < 9:
+        return np.zeros(len(points))
+    eighth = cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0]
     return np.asarray(0.5 * eighth)
 
 
@@ -151,11 +153,18 @@ def build_balls(
     solid : {"octahedron", "icosahedron"}
     seed : int
 
+    Raises
+    ------
+    ValueError
+        Fewer than two balls: one alone has no neighbour to take its radius from.
+
     Examples
     --------
     >>> build_balls(np.eye(3), np.arange(3)).vertices.shape
     (3, 6, 3)
     """
+    if len(rows) < 2:
+        raise ValueError(f"cage_spacing must leave at least 2 balls, found {len(rows)} for {len(points)} points")
     centres = points[rows]
     nearest = cKDTree(centres).query(centres, k=2, workers=-1)[0][:, 1]
     radii = radius * nearest

@@ -59,7 +59,8 @@ def test_separation():
     np.testing.assert_array_equal(cage.separation(POINTS, 0.25), np.full(400, 0.25))
     eighth = np.sort(np.linalg.norm(POINTS[:, None] - POINTS, axis=2), axis=1)[:, 8]
     np.testing.assert_allclose(cage.separation(POINTS, None), 0.5 * eighth)
-    assert cage.separation(np.eye(3), None).shape == (3,)
+    # Too few to tell what is near: each carries a ball.
+    np.testing.assert_array_equal(cage.separation(POINTS[:8], None), 0.0)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -86,3 +87,8 @@ def test_thinning_removes_twins_and_keeps_an_even_sampling():
 @pytest.mark.parametrize("separation", [0.0, 1e-12])
 def test_no_separation_keeps_every_point(separation):
     np.testing.assert_array_equal(cage.thin(POINTS, np.full(400, separation), 0), np.arange(400))
+
+
+def test_one_ball_alone_is_refused():
+    with pytest.raises(ValueError, match="cage_spacing must leave at least 2 balls, found 1 for 400 points"):
+        cage.build_balls(POINTS, cage.thin(POINTS, np.full(400, 10.0), 0))

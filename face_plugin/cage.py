@@ -1,4 +1,4 @@
-"""The Faraday cage: a small conducting ball at each point, approximated by a platonic solid (paper section 3.1)."""
+"""The Faraday cage: a small conducting ball at each point, as a platonic solid (paper section 3.1)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _icosahedron() -> NDArray[np.float64]:
     golden = (1 + 5**0.5) / 2
     short = [(0.0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
     vertices = np.array([np.roll(v, k) for k in range(3) for v in short])
-    return vertices / np.linalg.norm(vertices[0])
+    return np.asarray(vertices / np.linalg.norm(vertices[0]))
 
 
 SOLIDS: dict[str, NDArray[np.float64]] = {
@@ -81,7 +81,7 @@ def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArr
 def thin(
     points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
 ) -> NDArray[np.intp]:
-    """Poisson-disk subset: points taken in random order, each unless one nearer than its separation was taken.
+    """Take a Poisson-disk subset: points in random order, each unless one within its separation was taken.
 
     Parameters
     ----------
@@ -120,7 +120,9 @@ def thin(
 
 
 @numba.njit(cache=True)
-def _greedy(order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _greedy(
+    order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]
+) -> NDArray[np.bool_]:
     taken = np.zeros(len(order), dtype=np.bool_)
     for i in order:
         free = True
@@ -149,7 +151,8 @@ def build_balls(
     points : (n, 3) float64, distinct
     rows : (b,) intp
         Which of the points carry a ball.
-    radius : float, fraction of the distance to the nearest other ball's centre; below 0.5 the balls are disjoint
+    radius : float, fraction of the distance to the nearest other ball's centre
+        Below 0.5 the balls are disjoint.
     solid : {"octahedron", "icosahedron"}
     seed : int
 
@@ -164,7 +167,9 @@ def build_balls(
     (3, 6, 3)
     """
     if len(rows) < 2:
-        raise ValueError(f"cage_spacing must leave at least 2 balls, found {len(rows)} for {len(points)} points")
+        raise ValueError(
+            f"cage_spacing must leave at least 2 balls, found {len(rows)} for {len(points)} points"
+        )
     centres = points[rows]
     nearest = cKDTree(centres).query(centres, k=2, workers=-1)[0][:, 1]
     radii = radius * nearest

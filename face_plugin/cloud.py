@@ -1,8 +1,8 @@
 """Check the input once and put it into a canonical frame.
 
-This is the only place that judges bad input. What leaves it is finite, distinct, of unit size, and in an order
-that depends on the positions alone, so that everything after it is independent of the order of the input and of
-where, how large and how rotated the object is.
+This is the only place that judges bad input. What leaves it is finite, distinct, of unit size, and in an
+order that depends on the positions alone, so that everything after it is independent of the order of the
+input and of where, how large and how rotated the object is.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ MINIMUM_POINTS = 4
 MERGE_TOLERANCE = 1e-10
 # Smallest relative extent that still counts as a dimension of the object.
 FLAT_TOLERANCE = 1e-9
-# Principal axes are used only where they are well separated: on a cube or a sphere rounding would choose them.
+# Principal axes are used only where they are well separated: on a cube or a sphere rounding would choose
+# them.
 AXIS_GAP = 1e-3
 MORTON_BITS = 20
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Similarity between the input's coordinates and the canonical frame, ``x_unit = R (x - origin) / scale``.
+    """Similarity between the input's coordinates and the canonical ones, ``x_unit = R (x - origin) / scale``.
 
     Examples
     --------
@@ -52,19 +53,20 @@ class Frame:
 
     def to_unit(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """Positions (k, 3) from the input's coordinates to the canonical frame."""
-        return ((np.asarray(points, dtype=np.float64) - self.origin) / self.scale) @ self.rotation.T
+        unit = (np.asarray(points, dtype=np.float64) - self.origin) / self.scale
+        return np.asarray(unit @ self.rotation.T)
 
     def from_unit(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Positions (k, 3) from the canonical frame to the input's coordinates."""
-        return (points @ self.rotation) * self.scale + self.origin
+        return np.asarray((points @ self.rotation) * self.scale + self.origin)
 
     def rotate(self, vectors: NDArray[np.floating]) -> NDArray[np.float64]:
         """Directions (k, 3) from the input's axes to the canonical ones."""
-        return np.asarray(vectors, dtype=np.float64) @ self.rotation.T
+        return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.rotation.T)
 
     def unrotate(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions (k, 3) from the canonical axes to the input's."""
-        return vectors @ self.rotation
+        return np.asarray(vectors @ self.rotation)
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,11 @@ class Cloud:
     def size(self) -> int:
         """Number n of input points."""
         return len(self.rows)
+
+    def plane_normal(self) -> NDArray[np.float64]:
+        """Return the canonical unit normal (3,) of the plane of best fit, its greatest component positive."""
+        normal = np.linalg.svd(self.points - self.points.mean(axis=0), full_matrices=False)[2][2]
+        return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
 
 
 def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
@@ -148,8 +155,8 @@ def prepare(points: ArrayLike) -> Cloud:
     if len(array) < MINIMUM_POINTS:
         raise ValueError(f"points must hold at least {MINIMUM_POINTS} points, found {len(array)}")
     origin, scale = _extent(array)
-    # Repeated points go first, and the rest into an order of their own, so that neither they nor the order of the
-    # input can change a sum.
+    # Repeated points go first, and the rest into an order of their own, so that neither they nor the order of
+    # the input can change a sum.
     sort, first = _sorted_distinct(array.astype(np.float64))
     work = (array[sort[first]].astype(np.float64) - origin) / scale
     axes, extent = _axes(work)
@@ -169,7 +176,8 @@ def prepare(points: ArrayLike) -> Cloud:
     distinct = work[order[leads]]
     if len(distinct) < MINIMUM_POINTS:
         raise ValueError(
-            f"points must hold at least {MINIMUM_POINTS} distinct points, found {len(distinct)} among {len(array)}"
+            f"points must hold at least {MINIMUM_POINTS} distinct points, "
+            f"found {len(distinct)} among {len(array)}"
         )
     place = np.empty(len(work), dtype=np.intp)
     place[order] = np.cumsum(leads) - 1
@@ -206,7 +214,7 @@ def _sorted_distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDA
 
 
 def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rows: right-handed canonical axes of the points; and the points' relative extent along the principal ones."""
+    """Right-handed canonical axes (rows), and the relative extent of the points along the principal ones."""
     centred = points - points.mean(axis=0)
     variance, vectors = np.linalg.eigh(centred.T @ centred / len(points))
     variance, axes = np.maximum(variance[::-1], 0.0), vectors[:, ::-1].T
@@ -222,7 +230,7 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def morton_distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Morton order of points of unit size, twins next to each other, and which of the sorted ones leads its twins.
+    """Order points of unit size by Morton code, twins together; and tell which ones lead their twins.
 
     Points nearer than `MERGE_TOLERANCE` are twins, and so are the twins of twins.
 

@@ -19,8 +19,8 @@ __all__ = ["Locator"]
 
 # A barycentric coordinate may be this much below zero: a position on a facet belongs to either side.
 SLACK = 1e-12
-# The same where a walk does not end, since rounding decides between tetrahedra as small as that, or beside the crack
-# that a dropped, flat tetrahedron leaves.
+# The same where a walk does not end, since rounding decides between tetrahedra as small as that, or beside
+# the crack that a dropped, flat tetrahedron leaves.
 LOOSE = 1e-3
 # A walk from the nearest vertex takes about five steps; one that takes more than this many runs in circles.
 LONGEST_WALK = 500

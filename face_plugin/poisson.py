@@ -1,14 +1,14 @@
 """The Poisson problem of the cage: linear finite elements, the conductor eliminated, one factorisation.
 
-On tetrahedra of the box minus the balls, ``L u = 0`` with the cotangent Laplacian L, u given on the box, and one
-unknown value u_C on all balls together, whose net charge is zero (paper equation 4). With f the free vertices, b
-those of the box, c those of the balls and 1 the vector of ones, the potential is
+On tetrahedra of the box minus the balls, ``L u = 0`` with the cotangent Laplacian L, u given on the box, and
+one unknown value u_C on all balls together, whose net charge is zero (paper equation 4). With f the free
+vertices, b those of the box, c those of the balls and 1 the vector of ones, the potential is
 
     u_f = A^-1 (-L_fb g_b) + u_C A^-1 (-L_fc 1),   A = L_ff,
 
-a solution for the boundary data g with the cage at 0, plus u_C times the one with the cage at 1 and the box at 0. Only A
-is factorised: it is sparse, symmetric and positive definite, where carrying u_C would add a dense row. The flux out
-of the cage is linear in u_C; setting it to zero gives u_C.
+a solution for the boundary data g with the cage at 0, plus u_C times the one with the cage at 1 and the box
+at 0. Only A is factorised: it is sparse, symmetric and positive definite, where carrying u_C would add a
+dense row. The flux out of the cage is linear in u_C; setting it to zero gives u_C.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ class Poisson:
     ) -> NDArray[np.float64]:
         """u_C (s,) at which the net flux out of the cage is zero.
 
-        The balls share no tetrahedron with the box as long as a free vertex lies between; where one does, its entry
-        L_cb takes part through the row sums, which are zero: L_cc 1 = -(L_cf 1 + L_cb 1).
+        The balls share no tetrahedron with the box as long as a free vertex lies between; where one does, its
+        entry L_cb takes part through the row sums, which are zero: L_cc 1 = -(L_cf 1 + L_cb 1).
         """
         if not (self.mesh.owner >= 0).any():
             return np.zeros(box_values.shape[1])
@@ -153,15 +153,16 @@ def stiffness(
 def _local(vertices, tet, s):  # type: ignore[no-untyped-def]
     """Fill s (4, 4) with the local stiffness matrix of a tetrahedron.
 
-    grad(phi_i) = -n_i / (3 volume), with n_i the area-weighted outward normal of the facet opposite to vertex i.
+    grad(phi_i) = -n_i / (3 volume), with n_i the area-weighted outward normal of the facet without vertex i.
     """
     a = vertices[tet[1]] - vertices[tet[0]]
     b = vertices[tet[2]] - vertices[tet[0]]
     c = vertices[tet[3]] - vertices[tet[0]]
     n = np.empty((4, 3))
-    n[1, 0], n[1, 1], n[1, 2] = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
-    n[2, 0], n[2, 1], n[2, 2] = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
-    n[3, 0], n[3, 1], n[3, 2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    for i, p, q in ((1, b, c), (2, c, a), (3, a, b)):
+        n[i, 0] = p[1] * q[2] - p[2] * q[1]
+        n[i, 1] = p[2] * q[0] - p[0] * q[2]
+        n[i, 2] = p[0] * q[1] - p[1] * q[0]
     for k in range(3):
         n[0, k] = -n[1, k] - n[2, k] - n[3, k]
     six = a[0] * n[1, 0] + a[1] * n[1, 1] + a[2] * n[1, 2]
@@ -173,7 +174,7 @@ def _local(vertices, tet, s):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _assemble(vertices, tets, flat, free):  # type: ignore[no-untyped-def]
-    """CSR rows of the free vertices: entries are dropped into their rows, then merged by a scan along each row."""
+    """CSR rows of the free vertices: entries are dropped into their rows, then merged along each."""
     start = np.zeros(free + 1, dtype=np.int64)
     for t in range(len(tets)):
         for i in range(4):
@@ -220,7 +221,8 @@ def cage_to_box(mesh: CageMesh) -> NDArray[np.float64]:
     """Row 1^T L_cb (q,): the stiffness between the whole cage and each vertex of the box."""
     touching = (mesh.owner[mesh.tets] >= 0).any(axis=1) & mesh.boundary[mesh.tets].any(axis=1)
     number = np.cumsum(mesh.boundary) - 1
-    # The rows of the box's vertices, assembled as if they were free; only their column of the cage is of interest.
+    # The rows of the box's vertices, assembled as if they were free; only their column of the cage is of
+    # interest.
     column = np.where(mesh.boundary, number, np.where(mesh.owner >= 0, -1, -2))
     column[column == -2] = -2 - np.arange(np.count_nonzero(column == -2))
     rows = stiffness(mesh.vertices, mesh.tets[touching], column)

@@ -21,7 +21,7 @@ from face_plugin.meshers.select import build_mesh
 from face_plugin.params import Params
 from face_plugin.poisson import Poisson
 from face_plugin.sculpt import Sculptable, SculptFile
-from face_plugin.surface import Backend, poisson_reconstruction
+from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
 from face_plugin.tiles.choose import EngineLike, in_tiles
 
 __all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
@@ -133,6 +133,10 @@ class FaCE(Sculptable):
     @cached_property
     def _normals(self) -> NDArray[np.float64]:
         with self._stage("normals"):
+            if self.cloud.flat:
+                # The field is the same on both sides of a sheet: its mean gradient lies in the sheet.
+                plane = self.frame.unrotate(self.cloud.plane_normal())
+                return np.tile(plane, (self.cloud.size, 1))
             at_balls = normals.field_normals(self.mesh, self.vertex_strength)
             at_points = normals.carry(self.balls.centres, at_balls, self.cloud.points)
             return self.frame.unrotate(at_points)[self.cloud.rows]
@@ -294,6 +298,7 @@ def reconstruct(
     >>> surface.faces.shape[1]
     3
     """
+    backend = check_arguments(depth, backend, trim)
     result = estimate_normals(
         points, params, filter_interior=filter_interior, sculpt=sculpt, engine=engine, progress=progress
     )

@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from face_plugin.errors import MissingDependencyError, require
 
-__all__ = ["Backend", "poisson_reconstruction"]
+__all__ = ["Backend", "check_arguments", "poisson_reconstruction"]
 
 log = logging.getLogger(__name__)
 
 Backend = Literal["open3d", "pymeshlab"]
 BACKENDS: tuple[Backend, ...] = ("open3d", "pymeshlab")
 DEPTHS = (1, 16)
-# Weight of the points in the screened variant: the value that Kazhdan and Hoppe recommend for linear elements, and
-# the default of both hosts.
+FEWEST_POINTS = 4
+# Weight of the points in the screened variant: the value that Kazhdan and Hoppe recommend for linear
+# elements, and the default of both hosts.
 SCREENING = 4.0
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
@@ -34,7 +35,7 @@ def poisson_reconstruction(
     backend: Backend | None = None,
     trim: float = 0.0,
 ) -> Mesh:
-    """Reconstruct a surface from oriented points (Kazhdan and Hoppe 2013, screened; Kazhdan et al. 2006, not).
+    """Reconstruct a surface from oriented points (Kazhdan et al. 2006; screened: Kazhdan and Hoppe 2013).
 
     Parameters
     ----------
@@ -46,7 +47,8 @@ def poisson_reconstruction(
     backend : {"open3d", "pymeshlab"}, optional
         By default whichever is installed, Open3D first.
     trim : float, fraction in [0, 1)
-        Drop the vertices whose sampling density is in this lowest fraction (Open3D only). This opens the surface.
+        Drop the vertices whose sampling density is in this lowest fraction (Open3D only). This opens the
+        surface.
 
     Returns
     -------
@@ -71,16 +73,11 @@ def poisson_reconstruction(
     >>> vertices.shape[1], faces.shape[1]
     (3, 3)
     """
-    if isinstance(depth, bool) or not isinstance(depth, (int, np.integer)) or not DEPTHS[0] <= depth <= DEPTHS[1]:
-        raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
-    if not 0.0 <= trim < 1.0:
-        raise ValueError(f"trim must be in [0, 1), found {trim!r}")
-    if backend is None:
-        backend = _installed()
-    if backend not in BACKENDS:
-        raise ValueError(f"backend must be one of {BACKENDS} or None, found {backend!r}")
-    if trim > 0 and backend != "open3d":
-        raise ValueError(f"trim needs the backend 'open3d', which gives densities; found {backend!r}")
+    backend = check_arguments(depth, backend, trim)
+    if len(points) < FEWEST_POINTS:
+        raise ValueError(
+            f"points must hold at least {FEWEST_POINTS} points to reconstruct from, found {len(points)}"
+        )
     # Hosts work partly in single precision: reconstruct near the origin and at unit size.
     origin = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
     size = float(np.ptp(points, axis=0).max())
@@ -90,6 +87,28 @@ def poisson_reconstruction(
     if trim > 0 and densities is not None:
         vertices, faces, densities = _trimmed(vertices, faces, densities, trim)
     return vertices * size + origin, faces, densities
+
+
+def check_arguments(depth: int, backend: Backend | None, trim: float) -> Backend:
+    """Check the arguments of `poisson_reconstruction`, which come late; return the backend that will run.
+
+    Examples
+    --------
+    >>> check_arguments(8, "open3d", 0.1)
+    'open3d'
+    """
+    whole = isinstance(depth, (int, np.integer)) and not isinstance(depth, bool)
+    if not whole or not DEPTHS[0] <= depth <= DEPTHS[1]:
+        raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
+    if not 0.0 <= trim < 1.0:
+        raise ValueError(f"trim must be in [0, 1), found {trim!r}")
+    if backend is None:
+        backend = _installed()
+    if backend not in BACKENDS:
+        raise ValueError(f"backend must be one of {BACKENDS} or None, found {backend!r}")
+    if trim > 0 and backend != "open3d":
+        raise ValueError(f"trim needs the backend 'open3d', which gives densities; found {backend!r}")
+    return backend
 
 
 def _installed() -> Backend:
@@ -121,7 +140,10 @@ def _pymeshlab(points: NDArray[np.float64], normals: NDArray[np.float64], depth:
     pymeshlab = require("pymeshlab", extra="pymeshlab")
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
-    meshes.generate_surface_reconstruction_screened_poisson(depth=depth, pointweight=weight, preclean=False)
+    # One thread, as with Open3D.
+    meshes.generate_surface_reconstruction_screened_poisson(
+        depth=depth, pointweight=weight, preclean=False, threads=1
+    )
     mesh = meshes.current_mesh()
     return mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64), None
 

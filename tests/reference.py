@@ -1,7 +1,7 @@
 """The equations of the paper, word for word and slowly: dense matrices, one tetrahedron after the other.
 
-Nothing here is shared with the package: shape functions come from 4x4 inverses, the conductor is carried as an
-unknown of the system, maxima over directions are taken over directions.
+Nothing here is shared with the package: shape functions come from 4x4 inverses, the conductor is carried as
+an unknown of the system, maxima over directions are taken over directions.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def vertex_gradients(mesh: CageMesh, values: Array) -> Array:
 
 
 def strength(mesh: CageMesh, potential: Array, directions: Array) -> Array:
-    """Equation 5: the greatest norm of the field that any of the directions (d, 3) causes, at the vertices."""
+    """Equation 5: the greatest norm of the field that any of the directions (d, 3) causes."""
     gradients = vertex_gradients(mesh, potential)
     return np.max([np.linalg.norm(gradients @ v, axis=1) for v in directions], axis=0)
 
@@ -83,8 +83,11 @@ def icosphere(levels: int) -> Array:
     points = np.array(corners) / np.hypot(1, golden)
     edge = 2 / np.hypot(1, golden)
     for _ in range(levels):
-        pairs = [(i, j) for i, j in itertools.combinations(range(len(points)), 2)
-                 if np.linalg.norm(points[i] - points[j]) < 1.4 * edge]
+        pairs = [
+            (i, j)
+            for i, j in itertools.combinations(range(len(points)), 2)
+            if np.linalg.norm(points[i] - points[j]) < 1.4 * edge
+        ]
         middles = np.array([points[i] + points[j] for i, j in pairs])
         points = np.concatenate([points, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
         edge /= 2

@@ -2,10 +2,14 @@ import logging
 
 import numpy as np
 import pytest
-from face_plugin import cloud
 from scipy.spatial.transform import Rotation
 
-GOOD = np.random.default_rng(0).normal(size=(60, 3)) * [3.0, 2.0, 1.0] + np.random.default_rng(1).random((60, 3)) ** 4
+from face_plugin import cloud
+
+GOOD = (
+    np.random.default_rng(0).normal(size=(60, 3)) * [3.0, 2.0, 1.0]
+    + np.random.default_rng(1).random((60, 3)) ** 4
+)
 
 
 def broken(row, value):
@@ -36,7 +40,10 @@ def broken(row, value):
         (np.outer(np.linspace(0, 1, 9), [1, 2, 3]) + 1e6, "points must not all lie on one line"),
         (np.outer(np.linspace(0, 1, 9), [1, 2, 3]).astype(np.float32), "points must not all lie on one line"),
         (GOOD[:2].repeat(4, axis=0), "points must not all lie on one line"),
-        (np.array([[-1.7e308] * 3, [1.7e308] * 3, [0, 1e308, 0], [0, 0, 1]]), "points must span a finite length"),
+        (
+            np.array([[-1.7e308] * 3, [1.7e308] * 3, [0, 1e308, 0], [0, 0, 1]]),
+            "points must span a finite length",
+        ),
     ],
 )
 def test_bad_input_is_named(points, message):
@@ -45,14 +52,21 @@ def test_bad_input_is_named(points, message):
 
 
 def test_name_of_the_argument_is_in_the_message():
-    with pytest.raises(ValueError, match="^query must be finite"):
+    with pytest.raises(ValueError, match=r"^query must be finite"):
         cloud.as_points([[np.nan, 0, 0]], "query")
 
 
 @pytest.mark.parametrize(
     ("given", "kept"),
-    [("float64", "float64"), ("float32", "float32"), ("float16", "float32"), ("int32", "float64"), ("uint8", "float64"),
-     (">f8", "float64"), ("longdouble", "float64")],
+    [
+        ("float64", "float64"),
+        ("float32", "float32"),
+        ("float16", "float32"),
+        ("int32", "float64"),
+        ("uint8", "float64"),
+        (">f8", "float64"),
+        ("longdouble", "float64"),
+    ],
 )
 def test_types_of_numbers(given, kept):
     points = np.arange(15).reshape(5, 3).astype(given)

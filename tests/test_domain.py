@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from face_plugin import MeshingError, cage, domain, shapes
 from scipy.spatial import cKDTree
+
+from face_plugin import MeshingError, cage, domain, shapes
 
 SETTINGS = {"grading": 0.8, "finest": 1.5, "seed": 0}
 
@@ -81,7 +82,8 @@ def test_cells_grow_with_the_distance_to_the_points():
 
 
 @pytest.mark.parametrize(
-    ("change", "factor"), [({"grading": 0.4}, 1.76), ({"grading": 1.6}, 0.39), ({"finest": 0.75}, 2.49), ({"finest": 3.0}, 0.23)]
+    ("change", "factor"),
+    [({"grading": 0.4}, 1.76), ({"grading": 1.6}, 0.39), ({"finest": 0.75}, 2.49), ({"finest": 3.0}, 0.23)],
 )
 def test_settings_set_the_number_of_vertices(change, factor):
     points = shapes.torus(3000).points
@@ -98,5 +100,5 @@ def test_seed_moves_the_free_vertices_and_nothing_else():
 
 
 def test_too_many_cells_are_refused_before_they_are_made():
-    with pytest.raises(MeshingError, match="more than 500 free vertices.*Params.finest"):
+    with pytest.raises(MeshingError, match=r"more than 500 free vertices.*Params.finest"):
         filled(CLOUDS["torus"], most=500)

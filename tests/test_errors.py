@@ -1,8 +1,9 @@
 import subprocess
 import sys
 
-import face_plugin
 import pytest
+
+import face_plugin
 from face_plugin import errors
 
 
@@ -27,7 +28,11 @@ def test_missing_package_names_the_extra_to_install():
 @pytest.mark.parametrize(
     ("source", "error", "message"),
     [
-        ("raise ImportError('libGL.so.1: cannot open shared object file')", errors.MissingDependencyError, "libGL.so.1"),
+        (
+            "raise ImportError('libGL.so.1: cannot open shared object file')",
+            errors.MissingDependencyError,
+            "libGL.so.1",
+        ),
         ("raise OSError('libfoo.so: not found')", errors.MissingDependencyError, "libfoo.so"),
         # A package that is installed but broken must not be reported as missing.
         ("import a_package_of_no_name", ModuleNotFoundError, "a_package_of_no_name"),
@@ -42,7 +47,10 @@ def test_package_that_cannot_be_loaded(tmp_path, monkeypatch, source, error, mes
 
 
 def test_import_loads_nothing_heavy():
-    code = "import sys, face_plugin; print(sorted(set(sys.modules) & {'numpy','numba','scipy','gmsh','open3d','pymeshlab'}))"
+    code = (
+        "import sys, face_plugin;"
+        "print(sorted(set(sys.modules) & {'numpy','numba','scipy','gmsh','open3d','pymeshlab'}))"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
 
@@ -61,5 +69,5 @@ def test_public_names():
     for name in face_plugin.__all__:
         assert getattr(face_plugin, name).__name__ == name
         assert name in dir(face_plugin)
-    with pytest.raises(AttributeError, match="face_plugin.*nothing_of_that_name"):
+    with pytest.raises(AttributeError, match=r"face_plugin.*nothing_of_that_name"):
         _ = face_plugin.nothing_of_that_name

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 import reference
-from face_plugin import field
-from face_plugin.meshers import CageMesh
 from scipy.spatial.transform import Rotation
 from tet_meshes import cage_mesh
+
+from face_plugin import field
+from face_plugin.meshers import CageMesh
 
 
 @pytest.fixture(scope="module")
@@ -23,12 +24,19 @@ def test_gradients_of_linear_functions_are_exact(mesh):
 def test_gradients_are_weighted_by_volume(mesh):
     values = np.random.default_rng(2).normal(size=(len(mesh.vertices), 2))
     expected = reference.vertex_gradients(mesh, values)
-    np.testing.assert_allclose(field.vertex_gradients(mesh, values), expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        field.vertex_gradients(mesh, values), expected, atol=1e-9 * np.abs(expected).max()
+    )
 
 
 def test_vertex_without_tetrahedra_has_no_gradient(mesh):
     lonely = CageMesh(
-        np.concatenate([mesh.vertices, [[9.0, 9, 9]]]), mesh.tets, mesh.owner, mesh.boundary, mesh.lower, mesh.upper
+        np.concatenate([mesh.vertices, [[9.0, 9, 9]]]),
+        mesh.tets,
+        mesh.owner,
+        mesh.boundary,
+        mesh.lower,
+        mesh.upper,
     )
     values = np.append(mesh.vertices[:, 0], 5.0)[:, None]
     assert (field.vertex_gradients(lonely, values)[-1] == 0).all()
@@ -39,7 +47,8 @@ def test_greatest_strength_against_brute_force_over_ten_thousand_directions(demo
     exact = field.strength_exact(gradients)
     brute = field.strength_of_directions(gradients, reference.directions(10_000))
     assert (brute <= exact * (1 + 1e-12)).all()
-    # The nearest of 10,000 even directions is at most 1.4 degrees off the best one: cos = 0.9997. Measured: 0.99994.
+    # The nearest of 10,000 even directions is at most 1.4 degrees off the best one: cos = 0.9997. Measured:
+    # 0.99994.
     assert (brute >= 0.9997 * exact).all()
 
 
@@ -83,7 +92,10 @@ def test_six_directions_are_half_an_icosahedron():
 
 def test_six_directions_come_near_the_maximum(demo_face):
     gradients = field.vertex_gradients(demo_face.mesh, demo_face.potential())
-    exact, six = field.strength_exact(gradients), field.strength_of_directions(gradients, field.half_icosahedron())
+    exact, six = (
+        field.strength_exact(gradients),
+        field.strength_of_directions(gradients, field.half_icosahedron()),
+    )
     assert (six <= exact * (1 + 1e-12)).all()
     # No direction is farther than 37.4 degrees from one of the six or its opposite; cos = 0.7947.
     assert (six >= 0.794 * exact).all()
@@ -95,4 +107,7 @@ def test_strength_against_the_reference(mesh):
     np.testing.assert_allclose(
         field.strength(mesh, potential, "icosahedron"), reference.strength(mesh, potential, six), rtol=1e-9
     )
-    assert (field.strength(mesh, potential, "exact") >= field.strength(mesh, potential, "icosahedron") * (1 - 1e-12)).all()
+    assert (
+        field.strength(mesh, potential, "exact")
+        >= field.strength(mesh, potential, "icosahedron") * (1 - 1e-12)
+    ).all()

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from tet_meshes import grid_mesh
+
 from face_plugin import FaCE, Params, shapes
 from face_plugin.locate import Locator
 from face_plugin.meshers import CageMesh
 from face_plugin.normals import ball_means
-from tet_meshes import grid_mesh
 
 
 def in_the_box(mesh, count, seed=0):

@@ -2,10 +2,11 @@ import threading
 
 import numpy as np
 import pytest
-from face_plugin import FaCE, MeshingError, Params, cage, domain, shapes
-from face_plugin.meshers.delaunay import delaunay_mesh, gmsh_loads, tetrahedralize
 from scipy.spatial import cKDTree
 from tet_meshes import tet_volumes
+
+from face_plugin import FaCE, MeshingError, Params, cage, domain, shapes
+from face_plugin.meshers.delaunay import delaunay_mesh, gmsh_loads, tetrahedralize
 
 RNG = np.random.default_rng(0)
 LATTICE = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
@@ -17,10 +18,14 @@ CLOUDS = {
     "plane": RNG.random((200, 3)) * [1, 1, 0],
     "plane lattice": LATTICE[LATTICE[:, 2] == 0],
     "line and one": np.vstack([np.linspace([0, 0, 0], [1, 0, 0], 60), [[0.5, 0.1, 0.0]]]),
-    "circle": np.column_stack([np.cos(np.arange(50) * np.pi / 25), np.sin(np.arange(50) * np.pi / 25), np.zeros(50)]),
+    "circle": np.column_stack(
+        [np.cos(np.arange(50) * np.pi / 25), np.sin(np.arange(50) * np.pi / 25), np.zeros(50)]
+    ),
     "two densities": np.vstack([shapes.sphere(200).points, 1e-6 * shapes.sphere(200).points + [3, 0, 0]]),
     "geometric": np.geomspace(1e-6, 1, 200)[:, None] * RNG.normal(size=(200, 3)),
-    "twins": np.vstack([shapes.sphere(200).points, shapes.sphere(200).points + 1e-7 * RNG.normal(size=(200, 3))]),
+    "twins": np.vstack(
+        [shapes.sphere(200).points, shapes.sphere(200).points + 1e-7 * RNG.normal(size=(200, 3))]
+    ),
     "needle": shapes.sphere(100).points * [1e3, 1, 1],
     "four": np.vstack([np.zeros(3), np.eye(3)]),
     "five": np.vstack([np.zeros(3), np.eye(3), [[0.3, 0.3, -0.7]]]),
@@ -42,7 +47,9 @@ def test_mesh_fills_the_box_without_the_balls(name, solid):
     np.testing.assert_array_equal(mesh.vertices[: count * corners], balls.vertices.reshape(-1, 3))
     np.testing.assert_array_equal(mesh.owner[: count * corners], np.repeat(np.arange(count), corners))
     assert (mesh.owner[count * corners :] == -1).all()
-    np.testing.assert_array_equal(mesh.boundary, ((mesh.vertices == box.lower) | (mesh.vertices == box.upper)).any(axis=1))
+    np.testing.assert_array_equal(
+        mesh.boundary, ((mesh.vertices == box.lower) | (mesh.vertices == box.upper)).any(axis=1)
+    )
     np.testing.assert_array_equal([mesh.lower, mesh.upper], [box.lower, box.upper])
     volume = tet_volumes(mesh.vertices, mesh.tets)
     assert volume.min() > 0
@@ -67,7 +74,9 @@ def test_tetrahedra_are_delaunay():
 
 def test_gmsh_and_scipy_agree_on_random_points():
     points = RNG.random((500, 3))
-    ours, theirs = ({tuple(sorted(t)) for t in tetrahedralize(points, library).tolist()} for library in ("gmsh", "scipy"))
+    ours, theirs = (
+        {tuple(sorted(t)) for t in tetrahedralize(points, library).tolist()} for library in ("gmsh", "scipy")
+    )
     assert ours == theirs
 
 

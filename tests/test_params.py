@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from face_plugin import Params
 from face_plugin.params import ALPHAS, CHOICES
 
@@ -24,7 +25,7 @@ def test_numbers(name):
     for value in good:
         assert getattr(Params(**{name: value}), name) == value
     for value in [*bad, *NOT_NUMBERS]:
-        with pytest.raises(ValueError, match=f"^{name} must be .*found"):
+        with pytest.raises(ValueError, match=rf"^{name} must be .*found"):
             Params(**{name: value})
 
 
@@ -33,13 +34,13 @@ def test_choices(name):
     for value in CHOICES[name]:
         assert getattr(Params(**{name: value}), name) == value
     for value in ("", "no such thing", None, 1):
-        with pytest.raises(ValueError, match=f"^{name} must be one of"):
+        with pytest.raises(ValueError, match=rf"^{name} must be one of"):
             Params(**{name: value})
 
 
 @pytest.mark.parametrize("value", [-1, 1.0, "0", None, True])
 def test_seed(value):
-    with pytest.raises(ValueError, match="^seed must be an integer >= 0"):
+    with pytest.raises(ValueError, match=r"^seed must be an integer >= 0"):
         Params(seed=value)
 
 
@@ -50,7 +51,7 @@ def test_numpy_scalars_serve_as_numbers():
 def test_names_of_alpha():
     for name in ("auto", *ALPHAS):
         assert Params(alpha=name).alpha == name
-    with pytest.raises(ValueError, match="^alpha must be a number or one of"):
+    with pytest.raises(ValueError, match=r"^alpha must be a number or one of"):
         Params(alpha="thick")
 
 
@@ -71,7 +72,7 @@ def test_frozen_and_replaced():
     with pytest.raises(dataclasses.FrozenInstanceError):
         params.seed = 3
     assert dataclasses.replace(params, seed=3) == Params(seed=3)
-    with pytest.raises(ValueError, match="^grading"):
+    with pytest.raises(ValueError, match=r"^grading"):
         dataclasses.replace(params, grading=-1.0)
 
 
@@ -83,5 +84,10 @@ def test_dictionary_is_complete_and_goes_through_json():
 
 def test_choices_of_the_paper():
     paper = Params.paper(seed=5)
-    assert (paper.solid, paper.mesher, paper.directions, paper.angles) == ("icosahedron", "tetgen", "icosahedron", "field")
+    assert (paper.solid, paper.mesher, paper.directions, paper.angles) == (
+        "icosahedron",
+        "tetgen",
+        "icosahedron",
+        "field",
+    )
     assert (paper.ball_radius, paper.padding, paper.cage_spacing, paper.seed) == (0.45, 0.1, 0.0, 5)

@@ -4,13 +4,14 @@ import importlib.util
 import numpy as np
 import pytest
 import reference
+from scipy.spatial import Delaunay
+from scipy.spatial.transform import Rotation
+from tet_meshes import cage_mesh, grid_mesh, tet_volumes
+
 from face_plugin import MissingDependencyError, cage, domain, field
 from face_plugin.meshers import CageMesh
 from face_plugin.meshers.delaunay import delaunay_mesh
 from face_plugin.poisson import Poisson
-from scipy.spatial import Delaunay
-from scipy.spatial.transform import Rotation
-from tet_meshes import cage_mesh, grid_mesh, tet_volumes
 
 
 def small_mesh(count=9, seed=0):
@@ -40,7 +41,7 @@ def positive(vertices, tets):
 
 
 def shells_around_a_ball(level):
-    """Mesh between a conducting ball of radius 1 and a sphere of radius 4: concentric, finer with the level."""
+    """Mesh between a conducting ball of radius 1 and a sphere of radius 4; finer with the level."""
     radii = np.geomspace(1.0, 4.0, 3 * 2**level + 1)
     turns = Rotation.random(len(radii), random_state=0)
     sphere = reference.icosphere(level)
@@ -72,7 +73,8 @@ def test_ball_in_a_uniform_field_against_the_closed_form():
         exact = mesh.vertices * (1 - 1 / r**3)
         potential = Poisson(mesh).solve(exact[mesh.boundary])
         error.append(np.abs(potential - exact).max())
-        # Some direction is normal to the ball at each of its points: the field there is three times the outer one.
+        # Some direction is normal to the ball at each of its points: the field there is three times the outer
+        # one.
         at_ball = field.strength_exact(field.vertex_gradients(mesh, potential))[mesh.owner == 0]
         strength_error.append(np.abs(at_ball - 3.0).max())
         # Measured: 0.0017, 0.00024 and 0.00005.
@@ -145,7 +147,9 @@ def test_given_cage_potential_and_superposition():
     mesh = poisson.mesh
     box = mesh.vertices[mesh.boundary]
     held = poisson.solve(box, np.array([1.0, -2.0, 0.5]))
-    np.testing.assert_array_equal(held[mesh.owner >= 0], np.tile([1.0, -2.0, 0.5], ((mesh.owner >= 0).sum(), 1)))
+    np.testing.assert_array_equal(
+        held[mesh.owner >= 0], np.tile([1.0, -2.0, 0.5], ((mesh.owner >= 0).sum(), 1))
+    )
     np.testing.assert_array_equal(held[mesh.boundary], box)
     v = np.array([[0.6], [0.0], [-0.8]])
     np.testing.assert_allclose(poisson.solve(box @ v), poisson.solve(box) @ v, atol=1e-12)
@@ -162,7 +166,9 @@ def test_cholmod_agrees_with_superlu_or_says_what_to_install(demo_face):
             Poisson(mesh, "cholmod")
     else:
         # Measured: 2e-14.
-        np.testing.assert_allclose(Poisson(mesh, "cholmod").solve(box), Poisson(mesh, "superlu").solve(box), atol=1e-11)
+        np.testing.assert_allclose(
+            Poisson(mesh, "cholmod").solve(box), Poisson(mesh, "superlu").solve(box), atol=1e-11
+        )
 
 
 def test_order_of_tetrahedra_does_not_matter():

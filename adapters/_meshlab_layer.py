@@ -70,8 +70,8 @@ def _scratch(ms: Any, values: NDArray[Any]) -> str:
     """
     ml = require("pymeshlab", extra="pymeshlab")
     column = np.ascontiguousarray(values, dtype=np.float64)
-    for number in _fresh:
-        name = f"faraday_{number}"
+    while True:
+        name = f"faraday_{next(_fresh)}"
         try:
             ms.current_mesh().add_vertex_custom_scalar_attribute(column, name)
         except ml.PyMeshLabException as error:
@@ -79,7 +79,6 @@ def _scratch(ms: Any, values: NDArray[Any]) -> str:
                 raise
         else:
             return name
-    raise AssertionError("itertools.count has no end")
 
 
 def _evaluate(ms: Any, filter_name: str, **parameters: Any) -> None:

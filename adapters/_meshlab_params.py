@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 import operator
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args, get_type_hints
 
 from face_plugin.errors import require
 from face_plugin.params import CHOICES, Params
 
 __all__ = ["Parameter", "common_parameters", "params_of"]
 
-Kind = Literal["bool", "int", "float", "enum", "length"]
+Kind = Literal["bool", "int", "float", "str", "enum", "length"]
 TYPES: dict[str, str] = {
     "bool": "RichBool",
     "int": "RichInt",
     "float": "RichFloat",
+    "str": "RichString",
     "enum": "RichEnum",
     "length": "RichAbsPerc",
 }
-# MeshLab's numbers cannot be None or a word: in these, 0 stands for "derived from the data".
-AUTOMATIC = {"alpha": "auto", "cage_spacing": None}
+CASTS: dict[str, Callable[[Any], Any]] = {
+    "bool": bool,
+    "int": operator.index,
+    "float": float,
+    "enum": operator.index,
+}
+LENGTHS = ("cage_spacing",)
+AUTOMATIC = "0 = automatic"
 
 
 @dataclass(frozen=True)
@@ -48,43 +55,40 @@ class Parameter:
                 f"Parameter {self.name}: must be a pymeshlab.PercentageValue object or a pymeshlab.PureValue "
                 "object. Other type values are not accepted."
             )
-        if self.kind == "enum" and isinstance(value, str):
+        if isinstance(value, str) and self.kind == "str":
+            return value
+        if isinstance(value, str) and self.kind == "enum":
             if value not in self.choices:
                 allowed = "; ".join(map(repr, self.choices))
                 raise ml.InvalidEnumException(f"Enum '{value}' not found. Possible values are {allowed}; ")
             return value
         try:
-            if self.kind == "float" and not isinstance(value, str):
-                return float(value)
-            if self.kind == "bool" and not isinstance(value, str):
-                return bool(value)
-            index = operator.index(value)
+            if isinstance(value, str) or self.kind == "str":
+                raise TypeError
+            number = CASTS[self.kind](value)
         except (TypeError, ValueError):
             raise RuntimeError(
                 f"Parameter {self.name}: unable to cast Python instance of type {type(value)} to {self.kind}"
             ) from None
-        if self.kind == "enum":
-            if not 0 <= index < len(self.choices):
-                raise ml.InvalidEnumException(
-                    f"Enum {index} not valid. Must be a value between 0 and {len(self.choices)}"
-                )
-            return self.choices[index]
-        return index
+        if self.kind != "enum":
+            return number
+        if not 0 <= number < len(self.choices):
+            allowed = f"between 0 and {len(self.choices)}"
+            raise ml.InvalidEnumException(f"Enum {number} not valid. Must be a value {allowed}")
+        return self.choices[number]
 
     def read(self, text: str) -> Any:
         """Value of a ``Param`` of a script."""
-        if self.kind == "bool" and text in ("true", "false"):
-            return text == "true"
         try:
-            if self.kind in ("float", "length"):
-                return float(text)
+            if self.kind == "bool":
+                return {"true": True, "false": False}[text]
             if self.kind == "enum":
-                return self.choices[range(len(self.choices))[int(text)]]
+                return dict(enumerate(self.choices))[int(text)]
             if self.kind == "int":
                 return int(text)
-        except (ValueError, IndexError):
-            pass
-        raise ValueError(f"parameter {self.name}: {text!r} is no {self.kind}")
+            return text if self.kind == "str" else float(text)
+        except (ValueError, KeyError):
+            raise ValueError(f"parameter {self.name}: {text!r} is no {self.kind}") from None
 
     def write(self, value: Any, diagonal: float) -> dict[str, str]:
         """Attributes of a ``Param`` of a script, with those that MeshLab itself writes for the type."""
@@ -101,26 +105,27 @@ class Parameter:
 
 def common_parameters() -> tuple[Parameter, ...]:
     """Return the settings of `Params`, under their own names."""
-    found = []
+    found, hints = [], get_type_hints(Params)
     for field in dataclasses.fields(Params):
-        name, default = field.name, field.default
-        if name == "alpha":
-            text = "Field strength below which space counts as inside; 0 = automatic"
-            found.append(Parameter(name, "float", 0.0, text))
-        elif name == "cage_spacing":
-            text = "Smallest distance between two balls; 0 = automatic"
-            found.append(Parameter(name, "length", 0.0, text))
-        elif name in CHOICES:
-            found.append(Parameter(name, "enum", default, choices=CHOICES[name]))
-        elif isinstance(default, (bool, int, float)):
-            kinds: dict[type, Kind] = {bool: "bool", int: "int", float: "float"}
-            found.append(Parameter(name, kinds[type(default)], default))
+        types = get_args(hints[field.name]) or (hints[field.name],)
+        kind: Kind = "float" if float in types else "int" if int in types else "str"
+        if field.name in CHOICES:
+            found.append(Parameter(field.name, "enum", field.default, choices=CHOICES[field.name]))
+        elif field.name in LENGTHS:
+            found.append(Parameter(field.name, "length", 0.0, AUTOMATIC))
+        elif kind != "str" and not isinstance(field.default, (int, float)):
+            # MeshLab's numbers cannot be None or a word.
+            found.append(Parameter(field.name, kind, 0, AUTOMATIC))
+        else:
+            found.append(Parameter(field.name, kind, field.default))
     return tuple(found)
 
 
 def params_of(values: Mapping[str, Any]) -> Params:
     """Make the `Params` of the values of a filter's parameters."""
-    known = {field.name for field in dataclasses.fields(Params)} & values.keys()
-    settings: dict[str, Any] = {name: values[name] for name in known}
-    settings |= {name: word for name, word in AUTOMATIC.items() if values[name] == 0}
-    return Params(**settings)
+    given = {}
+    for parameter in common_parameters():
+        value = values[parameter.name]
+        if value != 0 or parameter.text != AUTOMATIC:
+            given[parameter.name] = value
+    return Params(**given)

@@ -34,6 +34,7 @@ __all__ = [
     "unregister",
 ]
 
+
 def compute_normal_by_faraday_cage(ms: Any, **parameters: Any) -> None:
     """Give the vertices of the current layer outward unit normals.
 

@@ -64,12 +64,14 @@ class Chain(Filter):
         ValueError, FaceError
             From a step, with its number (from 1) and name in front.
         """
+        asked = layer.classify
         for number, step in enumerate(self.steps, 1):
+            ahead = any(isinstance(later, Interior) for later in self.steps[number - 1 :])
             try:
-                layer = step(layer, progress=progress)
+                layer = step(layer.replace(classify=asked or ahead), progress=progress)
             except (ValueError, FaceError) as error:
                 raise type(error)(f"step {number} ({step.name}): {error}") from error
-        return layer
+        return layer.replace(classify=asked)
 
     @classmethod
     def from_dict(cls, options: Mapping[str, Any]) -> Chain:
@@ -128,10 +130,14 @@ class Chain(Filter):
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from error
         # A chain and its sculpt lie side by side, wherever the chain is run from.
-        return cls([
-            dataclasses.replace(step, file=str(path.parent / step.file)) if isinstance(step, Sculpt) else step
-            for step in chain.steps
-        ])
+        return cls(
+            [
+                dataclasses.replace(step, file=str(path.parent / step.file))
+                if isinstance(step, Sculpt)
+                else step
+                for step in chain.steps
+            ]
+        )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the chain to a .json or .toml file, which `load` reads back to an equal chain."""

@@ -46,6 +46,6 @@ class Interior(Filter):
 
     def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
         """Return `layer` with the interior points out of ``keep``; normals stay as they are."""
-        cage = layer.solved(self.params, progress)
+        cage = layer.replace(classify=True).solved(self.params, progress)
         inside = layer.scatter(cage.interior(self.alpha))
         return layer.replace(keep=layer.keep & ~inside, attributes={**layer.attributes, "interior": inside})

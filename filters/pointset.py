@@ -9,11 +9,13 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from face_plugin.filters.tiled import Tiled
 from numpy.typing import NDArray
 
 from face_plugin.cloud import as_points
 from face_plugin.params import Params
 from face_plugin.solver import FaCE, Progress
+from face_plugin.tiles.choose import in_tiles
 
 __all__ = ["Mesh", "PointSet"]
 
@@ -44,8 +46,10 @@ class PointSet:
     attributes : mapping of str to (n, ...) array_like, optional
         Anything else there is one of for each point.
     surface : Mesh, optional
-    cage : FaCE, optional
+    cage : FaCE or Tiled, optional
         The solved cage of the kept points, so that steps share one solve.
+    classify : bool
+        Whether a later step will ask for interior points; a large cloud is then classified in the same pass.
 
     Raises
     ------
@@ -65,7 +69,8 @@ class PointSet:
     keep: NDArray[np.bool_] = None  # type: ignore[assignment]  # all points, once their number is known
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     surface: Mesh | None = None
-    cage: FaCE | None = None
+    cage: FaCE | Tiled | None = None
+    classify: bool = False
 
     def __post_init__(self) -> None:
         points = as_points(self.points)
@@ -120,11 +125,14 @@ class PointSet:
             cage=self.cage,
         )
 
-    def solved(self, params: Params | None = None, progress: Progress | None = None) -> FaCE:
+    def solved(self, params: Params | None = None, progress: Progress | None = None) -> FaCE | Tiled:
         """Return the cage of the kept points: the one at hand, unless `params` asks for another."""
         if self.cage is not None and (params is None or params == self.cage.params):
             return self.cage
-        return FaCE(self.points[self.keep], params, progress=progress)
+        points, settings = self.points[self.keep], params or Params()
+        if in_tiles(len(points), settings):
+            return Tiled(points, settings, classify=self.classify, progress=progress)
+        return FaCE(points, settings, progress=progress)
 
     def scatter(self, values: NDArray[Any]) -> NDArray[Any]:
         """Spread values of the kept points over all n rows; the other rows are zero."""

@@ -9,7 +9,7 @@ from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 
 from face_plugin.params import Params
-from face_plugin.solver import Progress
+from face_plugin.solver import FaCE, Progress
 
 __all__ = ["Sculpt"]
 
@@ -58,4 +58,8 @@ class Sculpt(Filter):
         OSError
             The file cannot be read.
         """
-        return layer.replace(cage=layer.solved(self.params, progress).sculpted(self.file))
+        cage = layer.solved(self.params, progress)
+        if not isinstance(cage, FaCE):
+            # Edits need the one mesh that they are made in, whatever its size.
+            cage = FaCE(layer.points[layer.keep], cage.params, progress=progress)
+        return layer.replace(cage=cage.sculpted(self.file))

@@ -99,6 +99,16 @@ def test_settings_have_the_names_of_the_method_and_meshlabs_types():
         assert np.allclose(ms.mesh(0).vertex_normal_matrix(), expected, atol=1e-12)
 
 
+def test_a_large_layer_is_solved_in_tiles():
+    ms = ml.MeshSet()
+    points = torus(2200).points
+    ms.add_mesh(ml.Mesh(points))
+    face.compute_normal_by_faraday_cage(ms, tile_points=1200, engine="serial")
+    expected = estimate_normals(points, Params(tile_points=1200, engine="serial")).normals
+    assert np.array_equal(ms.current_mesh().vertex_normal_matrix(), expected)
+    assert not np.array_equal(expected, estimate_normals(points).normals)
+
+
 def test_interior_points_are_selected_for_meshlab_to_delete():
     inside = estimate_normals(NESTED.points, Params(alpha=0.02), filter_interior=True).interior
     ms = layer(NESTED.points)
@@ -150,6 +160,12 @@ def test_a_surface_is_a_new_current_layer_in_the_coordinates_of_the_scene():
         ({"onselected": "yes"}, "RuntimeError", "unable to cast Python instance of type <class 'str'>"),
         ({"solid": "cube"}, "InvalidEnumException", "Enum 'cube' not found. Possible values are 'octa"),
         ({"solid": 2}, "InvalidEnumException", "Enum 2 not valid. Must be a value between 0 and 2"),
+        ({"engine": 1}, "RuntimeError", "unable to cast Python instance of type <class 'int'>"),
+        (
+            {"engine": "cloud"},
+            "PyMeshLabException",
+            "Failed to apply filter: (.|\n)*engine must",
+        ),
         ({"solid": 0.5}, "RuntimeError", "unable to cast Python instance of type <class 'float'>"),
         ({"alpha": 1.5}, "PyMeshLabException", "Failed to apply filter: compute_.*\nDetails: alpha must"),
         ({"seed": -1}, "PyMeshLabException", "Failed to apply filter: compute_.*\nDetails: seed must"),

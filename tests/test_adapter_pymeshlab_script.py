@@ -144,6 +144,8 @@ def test_pymeshlab_runs_our_steps_once_they_are_registered(tmp_path):
         (NORMALS.replace("seed", "sead"), r"step 2 \(Compute Normal by .*\): unknown parameter 'sead'"),
         (NORMALS.replace('"4"', '"four"'), "parameter seed: 'four' is no int"),
         (NORMALS.replace('"solid" value="1"', '"solid" value="9"'), "parameter solid: '9' is no enum"),
+        (NORMALS.replace('"solid" value="1"', '"solid" value="-1"'), "parameter solid: '-1' is no enum"),
+        (NORMALS.replace("RichInt", "RichBool").replace("seed", "onselected"), "onselected: '4' is no bool"),
         (NORMALS.replace('"4"', '"-4"'), r"step 2 .*: Failed to apply filter: compute_(.|\n)*seed must"),
     ],
 )

@@ -10,13 +10,15 @@ from face_plugin.filters.base import Filter
 from face_plugin import Params
 from face_plugin.errors import MeshingError
 
-CHAIN = Chain([
-    Thin(0.125, seed=3),
-    Sculpt("/edits/a b.json", Params(cage_spacing=0.0)),
-    Normals(Params(cage_spacing=0.01, solid="icosahedron", alpha="dense")),
-    Interior("sparse"),
-    Surface(depth=9, screened=False, backend="pymeshlab"),
-])
+CHAIN = Chain(
+    [
+        Thin(0.125, seed=3),
+        Sculpt("/edits/a b.json", Params(cage_spacing=0.0)),
+        Normals(Params(cage_spacing=0.01, solid="icosahedron", alpha="dense")),
+        Interior("sparse"),
+        Surface(depth=9, screened=False, backend="pymeshlab"),
+    ]
+)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".toml", ".TOML"])

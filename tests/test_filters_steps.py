@@ -1,5 +1,7 @@
 """The steps: each does what the array call does, on the points that are kept."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
@@ -80,6 +82,36 @@ def test_thinning_keeps_a_poisson_disk_subset_of_what_was_kept(ring):
 def test_thinning_nothing_is_nothing():
     layer = Thin(0.3)(PointSet(np.eye(3), keep=[False] * 3))
     assert not layer.keep.any()
+
+
+def test_a_large_cloud_is_solved_in_tiles_and_classified_in_the_same_pass():
+    shape = nested_box(2500)
+    params = Params(tile_points=1500, engine="serial")
+    expected = estimate_normals(shape.points, params, filter_interior=True)
+    stages = []
+    layer = Chain([Normals(params), Interior()])(
+        PointSet(shape.points), progress=lambda stage, fraction: stages.append((stage, fraction))
+    )
+    assert np.array_equal(layer.normals, expected.normals)
+    assert np.array_equal(layer.attributes["interior"], expected.interior)
+    assert stages.count(("coarse", 1.0)) == 1
+    alone = Interior(params=params)(PointSet(shape.points))
+    assert np.array_equal(alone.keep, layer.keep)
+    # Another alpha takes another pass in tiles, with the same result as from the start.
+    other = Interior(0.3)(Normals(params)(PointSet(shape.points)))
+    direct = dataclasses.replace(params, alpha=0.3)
+    assert np.array_equal(
+        other.attributes["interior"], estimate_normals(shape.points, direct, filter_interior=True).interior
+    )
+
+
+def test_a_sculpted_cloud_is_solved_in_one_piece_whatever_its_size(tmp_path):
+    ring = torus(1600)
+    path = tmp_path / "edits.json"
+    SculptFile(charges=((0.0, 0.0, 0.0),)).save(path)
+    params = Params(tile_points=1000, engine="serial")
+    layer = Chain([Sculpt(str(path), params), Normals()])(PointSet(ring.points))
+    assert np.array_equal(layer.normals, estimate_normals(ring.points, params, sculpt=path).normals)
 
 
 @pytest.mark.parametrize("distance", [0.0, -1.0, np.inf, np.nan, True, "1"])

@@ -77,10 +77,7 @@ class Sculptable(ABC):
         ValueError
             A position is not finite, inside a ball, or on or outside the box. No edit is made then.
         """
-        level = self.params.alpha if alpha is None else alpha
-        edits = self._sculptor.add_charges(
-            positions, level if isinstance(level, (int, float)) else ALPHAS.get(level, ALPHAS["dense"])
-        )
+        edits = self._sculptor.add_charges(positions, self.proxy_level if alpha is None else alpha)
         self._follow()
         return edits
 
@@ -92,7 +89,7 @@ class Sculptable(ABC):
         positions : (k, 3) array_like of float, in the coordinates of the input
         radius : float or (k,) array_like of float, optional
             How far they reach, in the unit of the input; by default 0.9 x the distance to the nearest input
-            point, and where this reaches no vertex, to the nearest one.
+            point. Where there is no vertex within it, the nearest one joins.
 
         Returns
         -------
@@ -102,12 +99,17 @@ class Sculptable(ABC):
         Raises
         ------
         ValueError
-            As `add_charges`; or a radius is not positive or reaches no vertex, or a charge lies within it.
-            No edit is made then.
+            As `add_charges`; or a radius is not positive, or a charge lies within it. No edit is made then.
         """
         edits = self._sculptor.add_cage_points(positions, radius)
         self._follow()
         return edits
+
+    @property
+    def proxy_level(self) -> float:
+        """E_max on the proxy, by the settings; "auto" is as "dense"."""
+        alpha = self.params.alpha
+        return ALPHAS.get(alpha, ALPHAS["dense"]) if isinstance(alpha, str) else alpha
 
     @property
     def edits(self) -> tuple[Edit, ...]:

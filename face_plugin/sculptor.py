@@ -46,8 +46,7 @@ class Edit:
     position: NDArray[np.float64]
     """(3,) where it was asked for, in the coordinates of the input."""
     radius: float | None
-    """Reach of a cage point, in the unit of the input; None for a charge, and for a cage point that found no
-    vertex within its reach and took the nearest one."""
+    """Reach of a cage point, in the unit of the input; None for a charge."""
     vertices: NDArray[np.intp]
     """(k,) vertices of the mesh: that of a charge, or those that joined the conductor."""
     places: NDArray[np.float64]
@@ -122,7 +121,7 @@ class Sculptor:
         return self._added(made)
 
     def add_cage_points(self, positions: ArrayLike, radius: ArrayLike | None) -> tuple[Edit, ...]:
-        """Let the free vertices within `radius` of positions (k, 3) join the conductor."""
+        """Let the free vertices within `radius` of positions (k, 3), or else the nearest, join the conductor."""
         local = self._checked(positions)
         scale = self.cloud.frame.scale
         nearest = self._points.query(local)[0]
@@ -132,20 +131,15 @@ class Sculptor:
         for row, position in enumerate(np.array(positions, dtype=np.float64)):
             distance = np.linalg.norm(self.mesh.vertices[self._free] - local[row], axis=1)
             near = self._free[distance <= reach[row]]
-            found = float(reach[row]) * scale if len(near) else None
-            if found is None and radius is not None:
-                raise ValueError(
-                    f"radius[{row}] = {reach[row] * scale:g} reaches no vertex of the mesh; "
-                    f"the nearest is {distance.min() * scale:g} away"
-                )
-            if found is None:
+            if len(near) == 0:
+                # Away from the points the mesh is coarse.
                 near = self._free[[np.argmin(distance)]]
             if np.isin(held, near).any():
                 raise ValueError(
                     f"positions[{row}]: a charge lies where the conductor would grow, and would do nothing "
                     "there; remove it or use a smaller radius"
                 )
-            made.append(self._edit("cage", position, found, near))
+            made.append(self._edit("cage", position, float(reach[row]) * scale, near))
         return self._added(made)
 
     def remove(self, numbers: Iterable[int]) -> None:

@@ -313,14 +313,11 @@ def test_a_cage_point_takes_the_nearest_vertex_where_none_is_in_reach(shell):
     # Just off a ball: nothing but balls within 0.9 x the distance to its centre.
     ball = face.frame.from_unit(face.balls.centres[:1])[0]
     position = ball * (1 + 1.05 * face.balls.radii[0] * face.frame.scale / np.linalg.norm(ball))
-    (edit,) = face.add_cage_points([position])
-    assert edit.radius is None
-    np.testing.assert_allclose(edit.places, free[[np.linalg.norm(free - position, axis=1).argmin()]])
-    with pytest.raises(
-        ValueError, match=r"radius\[0\] = 0.001 reaches no vertex of the mesh; the nearest is"
-    ):
-        face.add_cage_points([position], radius=0.001)
-    assert face.edits == (edit,)
+    nearest = free[[np.linalg.norm(free - position, axis=1).argmin()]]
+    for radius in (None, 0.001):
+        (edit,) = face.add_cage_points([position], radius)
+        np.testing.assert_allclose(edit.places, nearest)
+        assert edit.radius == pytest.approx(radius or 0.9 * cKDTree(shell[0].points).query(position)[0])
 
 
 def test_a_charge_keeps_out_of_the_conductor(shell):

@@ -17,7 +17,7 @@ from face_plugin.errors import FaceError, MissingDependencyError
 
 __all__ = ["build_parser", "main"]
 
-COMMANDS = ("normals", "mesh", "ribbons", "info", "plot", "chain", "script")
+COMMANDS = ("normals", "mesh", "ribbons", "info", "plot", "view", "chain", "script")
 
 FAILED, BAD_INPUT, MISSING, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 EXIT_CODES = """exit codes:

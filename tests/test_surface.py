@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from tet_meshes import enclosed_volume, open_edges
 
-from face_plugin import FaCE, MissingDependencyError, reconstruct, shapes, surface
+from face_plugin import MissingDependencyError, reconstruct, shapes, surface
 from face_plugin.surface import poisson_reconstruction
 
 INSTALLED = [name for name in surface.BACKENDS if importlib.util.find_spec(name)]
@@ -28,10 +28,10 @@ def test_sphere_comes_back_closed_and_outward(backend, screened):
     if densities is not None:
         assert densities.shape == (len(vertices),)
     assert open_edges(faces) == 0
-    # Cells are 1.1 * 2 / 2^5 = 0.07 wide. Measured: radius within 0.012 screened, 0.02 not; volume within 2
-    # %.
+    # Cells are 1.1 * 2 / 2^5 = 0.07 wide. Measured for three seeds: the radius is within 0.008 screened and 0.017
+    # unscreened, the volume within 0.3 %.
     assert np.abs(np.linalg.norm(vertices, axis=1) - 1).max() < 0.04
-    assert enclosed_volume(vertices, faces) == pytest.approx(4 / 3 * np.pi, rel=0.04)
+    assert enclosed_volume(vertices, faces) == pytest.approx(4 / 3 * np.pi, rel=0.01)
 
 
 def test_screening_passes_nearer_to_the_points():
@@ -79,7 +79,7 @@ def test_float32_and_read_only_input(backend):
 def test_depth_sets_the_resolution():
     body = shapes.torus(8000)
     count = [len(poisson_reconstruction(body.points, body.normals, depth=depth)[1]) for depth in (5, 6)]
-    # Half the size of the cells, four times the triangles. Measured: 3.9 times.
+    # Half the size of the cells, four times the triangles. Measured: 3.84 times.
     assert count[1] > 3 * count[0]
 
 
@@ -130,29 +130,32 @@ def test_no_host_says_what_to_install(monkeypatch):
 def test_reconstruct_leaves_out_what_is_inside():
     shape = shapes.nested_box(1200, 0)
     found = reconstruct(shape.points, depth=5)
-    np.testing.assert_array_equal(found.result.interior, shape.interior)
+    # Measured for four seeds: at most one point of the sphere is taken for an inner one.
+    assert found.result.interior[shape.interior].all()
+    assert np.count_nonzero(found.result.interior != shape.interior) <= 4
     assert open_edges(found.faces) == 0
-    # One sphere: the box inside would leave vertices at half the radius. Measured: 0.98 to 1.03.
+    # One sphere: the box inside would leave vertices at half the radius. Measured: 0.993 to 1.006.
     radius = np.linalg.norm(found.vertices, axis=1)
-    assert radius.min() > 0.9
-    assert radius.max() < 1.1
-    assert enclosed_volume(found.vertices, found.faces) == pytest.approx(4 / 3 * np.pi, rel=0.05)
+    assert radius.min() > 0.98
+    assert radius.max() < 1.02
+    assert enclosed_volume(found.vertices, found.faces) == pytest.approx(4 / 3 * np.pi, rel=0.01)
     assert "surface" in found.result.timings
     assert found.densities is not None
     everything = reconstruct(shape.points, depth=5, filter_interior=False)
     assert everything.result.interior is None
-    assert np.linalg.norm(everything.vertices, axis=1).min() < 0.7
+    assert np.linalg.norm(everything.vertices, axis=1).min() < 0.5
 
 
 def test_reconstruct_keeps_the_unit_and_place_of_the_input():
     shape = shapes.sphere(500)
     found = reconstruct((1e4 * shape.points + 1e6).astype(np.float64), depth=5)
-    assert np.abs(np.linalg.norm((found.vertices - 1e6) / 1e4, axis=1) - 1).max() < 0.15
+    # Measured for three seeds: 0.015 to 0.018.
+    assert np.abs(np.linalg.norm((found.vertices - 1e6) / 1e4, axis=1) - 1).max() < 0.04
 
 
-def test_reconstruct_checks_its_arguments_before_it_solves(monkeypatch):
-    monkeypatch.setattr(FaCE, "_solve", lambda *_: pytest.fail("solved"))
+def test_reconstruct_checks_its_arguments_before_it_solves():
+    """With two mistakes, the one that would come to light minutes later is named first."""
     with pytest.raises(ValueError, match="depth must be an integer"):
-        reconstruct(BALL.points, depth=99)
+        reconstruct(np.zeros((0, 3)), depth=99)
     with pytest.raises(ValueError, match="backend must be one of"):
-        reconstruct(BALL.points, backend="cgal")
+        reconstruct(np.zeros((0, 3)), backend="cgal")

@@ -28,8 +28,8 @@ def test_sphere_comes_back_closed_and_outward(backend, screened):
     if densities is not None:
         assert densities.shape == (len(vertices),)
     assert open_edges(faces) == 0
-    # Cells are 1.1 * 2 / 2^5 = 0.07 wide. Measured for three seeds: the radius is within 0.008 screened and 0.017
-    # unscreened, the volume within 0.3 %.
+    # Cells are 1.1 * 2 / 2^5 = 0.07 wide. Measured for three seeds: the radius is within 0.008 screened and
+    # 0.017 unscreened, the volume within 0.3 %.
     assert np.abs(np.linalg.norm(vertices, axis=1) - 1).max() < 0.04
     assert enclosed_volume(vertices, faces) == pytest.approx(4 / 3 * np.pi, rel=0.01)
 

@@ -43,7 +43,7 @@ __all__ = ["PinnedPoisson", "rim"]
 # themselves.
 RINGS = 4
 # Largest error of a pinned potential, relative to its change.
-TOLERANCE = 1e-11
+TOLERANCE = 1e-10
 ITERATIONS = 200
 
 Operator = Callable[[NDArray[np.float64]], NDArray[np.float64]]

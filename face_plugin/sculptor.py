@@ -121,7 +121,7 @@ class Sculptor:
         return self._added(made)
 
     def add_cage_points(self, positions: ArrayLike, radius: ArrayLike | None) -> tuple[Edit, ...]:
-        """Let the free vertices within `radius` of positions (k, 3), or else the nearest, join the conductor."""
+        """Let the free vertices within `radius` of positions (k, 3), or else the nearest, join the cage."""
         local = self._checked(positions)
         scale = self.cloud.frame.scale
         nearest = self._points.query(local)[0]

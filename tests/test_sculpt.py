@@ -89,8 +89,8 @@ def test_pins_equal_a_dense_solve_from_scratch(solved, kind):
     found = PinnedPoisson(solved.poisson).solve(base, joined=joined, held=held, value=2.0)
     values = np.concatenate([mesh.vertices[box], np.full((len(held), 3), 2.0)])
     wanted = dense_solution(mesh, joined, np.concatenate([box, held]), values)
-    # The issue asks for 1e-8; conjugate gradients stop at 1e-11. Measured: 2e-13 to 2e-12.
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10)
+    # The issue asks for 1e-8; conjugate gradients stop at 1e-10 of the change.
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("reach", [0.05, 0.15, 0.4])
@@ -104,7 +104,7 @@ def test_pins_equal_a_new_factorisation(reach):
     values = np.where(np.isin(np.flatnonzero(boundary), held), 3.0, 0.0)[:, None]
     still = np.zeros((len(mesh.vertices), 1))
     found = PinnedPoisson(face.poisson).solve(still, joined=joined, held=held, value=3.0)
-    np.testing.assert_allclose(found, again.solve(values), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(found, again.solve(values), rtol=0, atol=1e-9)
 
 
 def test_shielded_vertices_need_no_pin(solved):
@@ -113,7 +113,7 @@ def test_shielded_vertices_need_no_pin(solved):
     assert 0 < len(outer) < len(joined)
     pinned = PinnedPoisson(solved.poisson)
     whole = pinned.solve(solved.potential(), joined=joined)
-    np.testing.assert_allclose(pinned.solve(solved.potential(), joined=outer), whole, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(pinned.solve(solved.potential(), joined=outer), whole, rtol=0, atol=1e-9)
 
 
 def test_a_cavity_filled_with_conductor_has_no_rim(shell):

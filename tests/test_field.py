@@ -47,9 +47,9 @@ def test_greatest_strength_against_brute_force_over_ten_thousand_directions(demo
     exact = field.strength_exact(gradients)
     brute = field.strength_of_directions(gradients, reference.directions(10_000))
     assert (brute <= exact * (1 + 1e-12)).all()
-    # The nearest of 10,000 even directions is at most 1.4 degrees off the best one: cos = 0.9997. Measured:
-    # 0.99994.
-    assert (brute >= 0.9997 * exact).all()
+    # The nearest of 10,000 even directions is at most 1.51 degrees off the best one: cos = 0.99965. Measured:
+    # 0.99977.
+    assert (brute >= 0.9996 * exact).all()
 
 
 @pytest.mark.parametrize(

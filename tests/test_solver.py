@@ -24,7 +24,7 @@ def judged(shape, normals):
 TRUTHS = {
     "sphere": (lambda s: shapes.sphere(800, s), 100, 5.5),  # 4.4 to 4.6
     "torus": (lambda s: shapes.torus(800, s), 100, 14),  # 11.6 to 12.4
-    "box": (lambda s: shapes.box(800, s), 100, 14),
+    "box": (lambda s: shapes.box(800, s), 100, 14),  # 11.0 to 11.8
     "two intersecting spheres": (lambda s: shapes.two_spheres(1200, s), 99.8, 8.5),  # 6.7 to 7.1
     "box in a sphere": (lambda s: shapes.nested_box(1200, s), 100, 5),  # 3.9 to 4.3
     "slab as thin as its spacing": (lambda s: shapes.slab(1500, s), 99.7, 11.5),  # 9.1 to 9.8
@@ -58,8 +58,8 @@ def test_choices_of_the_paper_agree_with_ours(params):
     shape = shapes.torus(500, 0)
     aligned, error = judged(shape, estimate_normals(shape.points, params).normals)
     assert aligned == 100
-    # Measured: 13.0 for the paper's choices.
-    assert error < 16
+    # Measured for three seeds: 10.4 to 10.9.
+    assert error < 13
 
 
 def test_six_directions_and_all_of_them_give_the_same_normals():
@@ -69,8 +69,9 @@ def test_six_directions_and_all_of_them_give_the_same_normals():
         for d in ("exact", "icosahedron")
     )
     angle = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", exact, six), -1, 1)))
-    # The prototype had 0.1 degrees on dense input; on this coarse torus: 0.75 in the mean.
-    assert angle.mean() < 1.5
+    # The prototype had 0.1 degrees on dense input. Measured for three seeds of this coarse torus: 1.34 to
+    # 1.39.
+    assert angle.mean() < 2
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -80,11 +81,11 @@ def test_cage_of_a_sphere_is_a_conducting_sphere(seed):
     directions = np.random.default_rng(seed).normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     for r in (1.3, 1.5, 2.0, 3.0):
-        # Measured: means within 3 % at 1.3, where the spacing is a third of the gap, and 1.3 % beyond; spread
-        # 2.5 %.
+        # Measured for five seeds: means within 2.6 % at 1.3, where the spacing is a third of the gap, and 1.2
+        # % beyond; spread up to 0.049.
         found = face.strength(r * directions)
         assert found.mean() == pytest.approx(1 + 2 / r**3, rel=0.05 if r < 1.5 else 0.03)
-        assert found.std() < 0.06
+        assert found.std() < 0.08
     # Inside, what leaks between the balls: measured up to 0.0003 in the mean.
     assert face.strength(0.5 * directions).mean() < 1e-3
 
@@ -92,7 +93,7 @@ def test_cage_of_a_sphere_is_a_conducting_sphere(seed):
 def test_interior_points_are_shielded():
     shape = shapes.nested_box(1200, 0)
     strength = estimate_normals(shape.points).strength
-    # Measured for five seeds: inner points up to 0.002, outer ones from 0.4.
+    # Measured for five seeds: inner points up to 0.002, outer ones from 0.44.
     assert strength[shape.interior].max() < 0.02
     assert strength[~shape.interior].min() > 0.2
 
@@ -192,8 +193,8 @@ def test_cage_of_some_of_the_points_carries_to_all():
     assert cKDTree(places).query(places, k=2)[0][:, 1].min() >= 0.15 * (1 - 1e-9)
     aligned, error = judged(shape, face.normals())
     assert aligned == 100
-    # Measured for five seeds: 10 to 12 degrees.
-    assert error < 16
+    # Measured for three seeds: 13.0 to 13.5.
+    assert error < 17
 
 
 def test_cage_spacing_larger_than_the_object_is_named():

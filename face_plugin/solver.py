@@ -245,6 +245,9 @@ def estimate_normals(
     True
     """
     array = cloud.as_points(points)
+    if sculpt is not None and not isinstance(sculpt, SculptFile):
+        # A bad file is said before the cage is solved.
+        sculpt = SculptFile.load(sculpt)
     if sculpt is None and in_tiles(len(array), params or Params()):
         from face_plugin.tiles.run import estimate_tiled
 

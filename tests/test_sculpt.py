@@ -492,6 +492,15 @@ def test_sculpt_in_one_call(shell, tmp_path):
     assert volume == pytest.approx(4 / 3 * np.pi * (1 - 0.5**3), rel=0.05)
 
 
+def test_a_bad_file_is_said_before_the_cage_is_solved(shell, tmp_path):
+    stages = []
+    (tmp_path / "edits.json").write_text("{}")
+    for run in (estimate_normals, reconstruct):
+        with pytest.raises(ValueError, match="the field 'version' is missing"):
+            run(shell[0].points, sculpt=tmp_path / "edits.json", progress=lambda *stage: stages.append(stage))
+    assert stages == []
+
+
 def test_the_cloud_stays_as_it_was(shell):
     face = shell[1].sculpted(SculptFile(charges=((0.0, 0.0, 0.0),)))
     assert isinstance(face.cloud, Cloud)

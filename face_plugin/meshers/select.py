@@ -22,10 +22,11 @@ __all__ = ["build_mesh"]
 
 log = logging.getLogger(__name__)
 
-# Measured (docs/meshers.md): bytes a vertex of the mesh for Delaunay, bytes a ball for the others.
+# Measured (docs/meshers.md): bytes a vertex of the mesh for Delaunay, bytes a vertex of the balls for the
+# others, which place the free vertices themselves.
 VERTEX_BYTES: dict[Library, float] = {"gmsh": 2000.0, "scipy": 3000.0}
-TETGEN_BALL_BYTES = 150e3
-TETWILD_BALL_BYTES = 150e3
+TETGEN_BYTES = 10e3
+TETWILD_BYTES = 3e3
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,17 @@ class _Mesher:
     clearance: float
 
 
+def _check_memory(balls: Balls, vertex_bytes: float, memory: float) -> float:
+    """Bytes that the vertices of the balls will take; raise where that is more than `memory`."""
+    count, solid = balls.vertices.shape[:2]
+    taken = float(count * solid * vertex_bytes)
+    gate.check_memory(taken, memory, f"a mesh around {count} balls of {solid} vertices")
+    return taken
+
+
 def _delaunay(library: Library) -> _Mesher:
     def make(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Params, memory: float) -> CageMesh:
-        taken = balls.vertices.shape[0] * balls.vertices.shape[1] * VERTEX_BYTES[library]
-        gate.check_memory(taken, memory, f"a mesh around {len(balls.radii)} balls")
+        taken = _check_memory(balls, VERTEX_BYTES[library], memory)
         filling = fill(
             balls,
             spacing,
@@ -57,24 +65,20 @@ def _delaunay(library: Library) -> _Mesher:
 
 
 def _tetgen(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Params, memory: float) -> CageMesh:
-    gate.check_memory(
-        TETGEN_BALL_BYTES * len(balls.radii), memory, f"TetGen's mesh around {len(balls.radii)} balls"
-    )
+    _check_memory(balls, TETGEN_BYTES, memory)
     return tetgen_mesh(balls, box, memory=memory)
 
 
 def _tetwild(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Params, memory: float) -> CageMesh:
-    gate.check_memory(
-        TETWILD_BALL_BYTES * len(balls.radii), memory, f"fTetWild's mesh around {len(balls.radii)} balls"
-    )
+    _check_memory(balls, TETWILD_BYTES, memory)
     return tetwild_mesh(balls, box, memory=memory)
 
 
 MESHERS = {
     "gmsh": _delaunay("gmsh"),
     "scipy": _delaunay("scipy"),
-    "tetgen": _Mesher(_tetgen, smallest=1e-7, gap=1e-6, clearance=1e-6),
-    "tetwild": _Mesher(_tetwild, smallest=1e-7, gap=1e-6, clearance=1e-6),
+    "tetgen": _Mesher(_tetgen, smallest=1e-9, gap=1e-12, clearance=1e-9),
+    "tetwild": _Mesher(_tetwild, smallest=1e-4, gap=1e-9, clearance=1e-9),
 }
 
 

@@ -12,7 +12,18 @@ from scipy.spatial import ConvexHull
 from face_plugin.cage import Balls
 from face_plugin.domain import Box
 
-__all__ = ["Boundary", "ball_volumes", "boundary_surface", "faces_of_solid", "oriented", "tet_volumes"]
+__all__ = [
+    "Boundary",
+    "ball_volumes",
+    "boundary_surface",
+    "faces_of_solid",
+    "oriented",
+    "snapped_to_box",
+    "tet_volumes",
+]
+
+# How far from the box a vertex still lies on it, relative to its longest side: a few rounding errors.
+ON_BOX = 1e-12
 
 
 @dataclass(frozen=True)
@@ -159,6 +170,24 @@ def boundary_surface(balls: Balls, box: Box) -> Boundary:
         np.concatenate([on_balls, on_box]).astype(np.int32),
         np.concatenate([np.repeat(np.arange(count), len(inward)), np.full(len(on_box), -1)]).astype(np.int32),
     )
+
+
+def snapped_to_box(vertices: NDArray[np.float64], box: Box) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Vertices (m, 3) of which those on the box are exactly on it, and which (m,) these are.
+
+    A mesher puts vertices of its own on the box only up to rounding.
+
+    Examples
+    --------
+    >>> unit = Box(np.zeros(3), np.ones(3))
+    >>> vertices, on_box = snapped_to_box(np.array([[0.5, 0.5, 1 - 1e-15], [0.5, 0.5, 0.5]]), unit)
+    >>> vertices[0], on_box
+    (array([0.5, 0.5, 1. ]), array([ True, False]))
+    """
+    tolerance = ON_BOX * float((box.upper - box.lower).max())
+    low, high = vertices - box.lower <= tolerance, box.upper - vertices <= tolerance
+    snapped = np.where(low, box.lower, np.where(high, box.upper, vertices))
+    return snapped, np.asarray((low | high).any(axis=1))
 
 
 def _outward_hull(points: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -14,7 +14,7 @@ from face_plugin.domain import Box
 from face_plugin.errors import MeshingError, require
 from face_plugin.meshers import CageMesh
 from face_plugin.meshers.native import run_native
-from face_plugin.meshers.surfaces import boundary_surface
+from face_plugin.meshers.surfaces import boundary_surface, oriented, snapped_to_box
 
 __all__ = ["tetgen_mesh"]
 
@@ -72,15 +72,13 @@ def tetgen_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
         memory=memory,
         advice=ADVICE,
     )
-    vertices = made["vertices"].astype(np.float64)
-    tets = made["tets"].astype(np.int32)
-    if len(tets) == 0:
+    if len(made["tets"]) == 0:
         raise MeshingError(f"tetgen made no tetrahedra; {ADVICE}")
+    vertices, boundary = snapped_to_box(made["vertices"].astype(np.float64), box)
+    tets = oriented(vertices, made["tets"].astype(np.int32), flat=0.0)
     owner = np.full(len(vertices), -1, dtype=np.int32)
-    boundary = np.zeros(len(vertices), dtype=np.bool_)
     markers = made["markers"].ravel().astype(np.int32)
     faces = made["faces"].astype(np.int64)
-    boundary[faces[markers == 1]] = True
     on_ball = markers >= 2
     owner[faces[on_ball]] = (markers[on_ball] - 2)[:, None]
     return CageMesh(vertices, tets, owner, boundary, box.lower, box.upper)

@@ -18,22 +18,25 @@ from face_plugin.domain import Box
 from face_plugin.errors import MeshingError, require
 from face_plugin.meshers import CageMesh
 from face_plugin.meshers.native import run_native
-from face_plugin.meshers.surfaces import boundary_surface, oriented
+from face_plugin.meshers.surfaces import boundary_surface, oriented, snapped_to_box
 
 __all__ = ["PRACTICAL_BALLS", "tetwild_mesh"]
 
 log = logging.getLogger(__name__)
 
-PRACTICAL_BALLS = 3000
-"""Beyond this number of balls a mesh takes minutes (docs/meshers.md)."""
+PRACTICAL_BALLS = 20_000
+"""Beyond this number of balls a mesh takes over half a minute (docs/meshers.md)."""
 
 # Length of the edges far from the balls, as a fraction of the box's diagonal.
 EDGE_LENGTH = 0.05
-# How far fTetWild may stray from a triangle, as a fraction of the box's diagonal.
+# How far fTetWild may stray from a triangle, as a fraction of the box's diagonal. Its time grows with the
+# inverse square (1e-4 takes 20 times as long); at 1e-3 balls down to a radius of 2e-4 survive, those of 3e-5
+# do not.
 ENVELOPE = 1e-3
-# How far from the box a vertex still lies on it, and beyond a ball's sphere still on the ball, relative to
-# their sizes.
-ON_BOX = 1e-9
+# Tetrahedra whose height is rounding, relative to the box: on its faces fTetWild leaves some of 1e-13; the
+# next are above 1e-6.
+FLATTEST = 1e-11
+# How far beyond a ball's sphere a vertex still lies on the ball, relative to its radius.
 ON_BALL = 1e-3
 ADVICE = (
     "try Params.mesher='delaunay', or a Params.cage_spacing above the distance of points that nearly coincide"
@@ -42,6 +45,8 @@ ADVICE = (
 
 def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
     """Mesh the box minus the balls with fTetWild.
+
+    Two runs differ a little: fTetWild shuffles its triangles with a generator that cannot be seeded.
 
     Parameters
     ----------
@@ -73,7 +78,8 @@ def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
     require("pytetwild", extra="tetwild")
     if len(balls.radii) > PRACTICAL_BALLS:
         log.warning(
-            "fTetWild takes minutes for %d balls (more than %d); a larger Params.cage_spacing makes fewer",
+            "fTetWild takes over half a minute for %d balls (more than %d); "
+            "a larger Params.cage_spacing makes fewer",
             len(balls.radii),
             PRACTICAL_BALLS,
         )
@@ -90,18 +96,15 @@ def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
         memory=memory,
         advice=ADVICE,
     )
-    vertices, tets = made["vertices"].astype(np.float64), made["tets"].astype(np.int32)
-    if len(tets) == 0:
+    if len(made["tets"]) == 0:
         raise MeshingError(f"tetwild made no tetrahedra; {ADVICE}")
-    tets = oriented(vertices, tets, flat=0.0)
-    boundary = _on_box(vertices, box)
+    vertices, boundary = snapped_to_box(made["vertices"].astype(np.float64), box)
+    flat = FLATTEST * float((box.upper - box.lower).max())
+    tets = oriented(vertices, made["tets"].astype(np.int32), flat)
+    # On a face of the box, flat tetrahedra may have had vertices for themselves.
+    used, place = np.unique(tets, return_inverse=True)
+    vertices, boundary, tets = vertices[used], boundary[used], place.reshape(tets.shape).astype(np.int32)
     return CageMesh(vertices, tets, _owners(vertices, tets, boundary, balls), boundary, box.lower, box.upper)
-
-
-def _on_box(vertices: NDArray[np.float64], box: Box) -> NDArray[np.bool_]:
-    tolerance = ON_BOX * float((box.upper - box.lower).max())
-    at_face = np.minimum(np.abs(vertices - box.lower), np.abs(vertices - box.upper)) <= tolerance
-    return np.asarray(at_face.any(axis=1))
 
 
 def _owners(

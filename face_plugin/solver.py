@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin import cage, cloud, domain, field, normals
+from face_plugin import cage, cloud, domain, field, interior, normals
+from face_plugin.confidence import confidence
 from face_plugin.locate import Locator
 from face_plugin.meshers.select import build_mesh
-from face_plugin.params import Params
+from face_plugin.params import ALPHAS, Params
 from face_plugin.poisson import Poisson
+from face_plugin.refine import refine
 from face_plugin.sculpt import Sculptable, SculptFile
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
 from face_plugin.tiles.choose import EngineLike, in_tiles
@@ -41,7 +43,8 @@ class Result:
     strength: NDArray[np.floating]
     """(n,) E_max at the point's ball; unshielded space has 1."""
     confidence: NDArray[np.floating]
-    """(n,) confidence in the side of the normal, in [0, 1]."""
+    """(n,) confidence in the side of the normal, in [0, 1], as `face_plugin.confidence` defines it: the agreement of
+    field and points, times the jump of the winding number across the point."""
     interior: NDArray[np.bool_] | None
     """(n,) whether the point lies inside the object; None where it was not asked for."""
     timings: dict[str, float]
@@ -131,19 +134,37 @@ class FaCE(Sculptable):
         return field.strength(self.mesh, potential, self.params.directions)
 
     @cached_property
+    def _point_strength(self) -> NDArray[np.float64]:
+        """E_max at the balls nearest to the distinct points (m,)."""
+        ball = cKDTree(self.balls.centres).query(self.cloud.points, workers=-1)[1]
+        return normals.ball_means(self.mesh, self.vertex_strength)[ball]
+
+    @cached_property
+    def _field_normals(self) -> NDArray[np.float64]:
+        """Gradient of the strength at the distinct points (m, 3), in the canonical frame."""
+        at_balls = normals.field_normals(self.mesh, self.vertex_strength)
+        return normals.carry(self.balls.centres, at_balls, self.cloud.points)
+
+    @cached_property
     def _normals(self) -> NDArray[np.float64]:
+        """Normals of the distinct points (m, 3), in the canonical frame."""
         with self._stage("normals"):
             if self.cloud.flat:
                 # The field is the same on both sides of a sheet: its mean gradient lies in the sheet.
-                plane = self.frame.unrotate(self.cloud.plane_normal())
-                return np.tile(plane, (self.cloud.size, 1))
-            at_balls = normals.field_normals(self.mesh, self.vertex_strength)
-            at_points = normals.carry(self.balls.centres, at_balls, self.cloud.points)
-            return self.frame.unrotate(at_points)[self.cloud.rows]
+                return np.tile(self.cloud.plane_normal(), (len(self.cloud.points), 1))
+            # 7. The strength grows outward, so its gradient at a ball points outward.
+            rough = self._field_normals
+            # 8. Stray sides turned round, and angles, from the points themselves.
+            return refine(self.cloud.points, rough) if self.params.angles == "refined" else rough
+
+    @cached_property
+    def _enclosure(self) -> NDArray[np.float64]:
+        """Winding number (m,) of the oriented points at each distinct point."""
+        return interior.enclosure(self.cloud.points, self._normals, self._point_strength)
 
     def normals(self) -> NDArray[np.floating]:
         """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
-        return self._normals.astype(self.cloud.dtype)
+        return self.frame.unrotate(self._normals)[self.cloud.rows].astype(self.cloud.dtype)
 
     def potential(self) -> NDArray[np.float64]:
         """Potentials (m, 3) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""
@@ -170,18 +191,39 @@ class FaCE(Sculptable):
         return Locator(self.mesh)
 
     def interior(self, alpha: float | str | None = None) -> NDArray[np.bool_]:
-        """Which input points (n,) lie inside the object; `alpha` as in `Params`. Nothing is solved again."""
-        raise NotImplementedError
+        """Which input points lie inside the object. Nothing is solved again, whatever alpha.
+
+        Parameters
+        ----------
+        alpha : float or {"auto", "dense", "sparse"}, optional
+            As in `Params.alpha`, which is the default. A number, or a name for the paper's 0.01 and 0.05: the points
+            that this isosurface of E_max encloses (paper section 3.5). "auto": those of them that the other points
+            enclose as well, with alpha from the leak of the cage; see `face_plugin.interior`.
+
+        Returns
+        -------
+        (n,) bool
+        """
+        alpha = Params(alpha=self.params.alpha if alpha is None else alpha).alpha  # type: ignore[arg-type]
+        enclosed = self._enclosure if alpha == "auto" else None
+        with self._stage("interior"):
+            if enclosed is not None:
+                level = interior.automatic_alpha(self._point_strength, enclosed)
+            else:
+                level = ALPHAS[alpha] if isinstance(alpha, str) else alpha
+            inside = interior.shielded(
+                self.mesh, self.vertex_strength, self.cloud.points, level, self.params.inside
+            )
+            return interior.is_interior(inside, enclosed)[self.cloud.rows]
 
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
         dtype, rows = self.cloud.dtype, self.cloud.rows
-        ball = cKDTree(self.balls.centres).query(self.cloud.points, workers=-1)[1][rows]
-        at_balls = normals.ball_means(self.mesh, self.vertex_strength)
+        oriented = self.normals()
         return Result(
-            normals=self.normals(),
-            strength=at_balls[ball].astype(dtype),
-            confidence=np.ones(len(rows), dtype=dtype),
+            normals=oriented,
+            strength=self._point_strength[rows].astype(dtype),
+            confidence=confidence(self.cloud.points, self._field_normals, self._normals)[rows].astype(dtype),
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=self.params,
@@ -273,7 +315,7 @@ def reconstruct(
     engine: EngineLike = None,
     progress: Progress | None = None,
 ) -> Surface:
-    """Closed surface of an unoriented point cloud: normals, interior points dropped, Poisson reconstruction.
+    """Reconstruct the closed surface of an unoriented point cloud: normals, interior points dropped, Poisson reconstruction.
 
     Parameters
     ----------

@@ -1,0 +1,186 @@
+"""The winding-number field of oriented points: a sum of dipoles, by a tree.
+
+The winding number at x of points p_j with area-weighted normals a_j n_j is (Barill et al. 2018, equation 2)
+
+    w(x) = 1 / (4 pi) sum_j a_j n_j . (p_j - x) / |p_j - x|^3.
+
+It is 1 inside, 0 outside, and its gradient at the surface is the inward normal. Kernels are regularised,
+|p_j - x|^2 + eps^2, and far groups of points act as one dipole at their centre.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["DipoleTree"]
+
+LEAF = 8
+# A group acts as one dipole where its radius is below this fraction of the distance: the error in the direction of
+# the gradient is then below 0.5 degrees, on points where the exact sum and the tree were compared.
+OPENING = 0.5
+# Deep enough for 2**48 leaves.
+STACK = 100
+
+
+class DipoleTree:
+    """Points with areas, in a binary tree over their order.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        In an order in which neighbours are near, such as Morton order; any order gives the same result, slower.
+    areas : (n,) float64, in the squared unit of the points
+
+    Examples
+    --------
+    >>> tree = DipoleTree(np.eye(3), np.ones(3))
+    >>> tree.outward(np.eye(3), np.full(3, 0.1)).shape
+    (3, 3)
+    """
+
+    def __init__(self, points: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
+        self.points = np.ascontiguousarray(points)
+        self.areas = np.ascontiguousarray(areas)
+        self._start, self._stop, self._child, self._centre, self._radius = _build(self.points, self.areas, LEAF)
+
+    def outward(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Steepest descent -grad w of the winding number at each point, of the dipoles of all the others.
+
+        A point's own dipole is left out: it would vote for the normal that the point has.
+
+        Parameters
+        ----------
+        normals : (n, 3) float64
+        eps : (n,) float64
+            Width of the kernel at each point, > 0.
+
+        Returns
+        -------
+        (n, 3) float64
+            Times 4 pi.
+        """
+        return self._evaluate(normals, eps)[:, :3]
+
+    def number(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Winding number (n,) at each point, of the dipoles of all the others; arguments as in `outward`.
+
+        About 1/2 at a point of the surface, 1 inside it and 0 outside.
+        """
+        return self._evaluate(normals, eps)[:, 3] / (4.0 * np.pi)
+
+    def _evaluate(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Columns of -4 pi grad w, and 4 pi w."""
+        dipoles = np.ascontiguousarray(normals * self.areas[:, None])
+        moments = _moments(dipoles, self._start, self._stop)
+        out = np.empty((len(self.points), 4))
+
+        def run(rows: slice) -> None:
+            _dipole_sums(
+                rows.start, rows.stop, self.points, dipoles, eps, self._start, self._stop, self._child, self._centre,
+                self._radius, moments, OPENING, out,
+            )  # fmt: skip
+
+        in_threads(run, len(self.points))
+        return out
+
+
+def in_threads(run: Callable[[slice], None], count: int) -> None:
+    """Call ``run(slice)`` for pieces of `count` rows on all cores; a row is computed alone, so any split is equal."""
+    pieces = max(1, min(os.cpu_count() or 1, count // 512))
+    bounds = np.linspace(0, count, 4 * pieces + 1).astype(int)
+    slices = [slice(a, b) for a, b in itertools.pairwise(bounds)]
+    with ThreadPoolExecutor(pieces) as pool:
+        list(pool.map(run, slices))
+
+
+@numba.njit(cache=True)
+def _build(points, areas, leaf):  # type: ignore[no-untyped-def]
+    """Halve ranges of the order until they hold at most `leaf` points; children follow their parents."""
+    most = 4 * (len(points) // leaf + 2)
+    start, stop = np.zeros(most, np.int64), np.zeros(most, np.int64)
+    child = np.full(most, -1, np.int64)
+    count, node = 1, 0
+    stop[0] = len(points)
+    while node < count:
+        if stop[node] - start[node] > leaf:
+            middle = (start[node] + stop[node]) // 2
+            child[node] = count
+            start[count], stop[count] = start[node], middle
+            start[count + 1], stop[count + 1] = middle, stop[node]
+            count += 2
+        node += 1
+    centre, radius = np.zeros((count, 3)), np.zeros(count)
+    for node in range(count):
+        total = 0.0
+        for k in range(start[node], stop[node]):
+            total += areas[k]
+            centre[node] += areas[k] * points[k]
+        centre[node] /= total
+        for k in range(start[node], stop[node]):
+            d = points[k] - centre[node]
+            radius[node] = max(radius[node], np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
+    return start[:count], stop[:count], child[:count], centre, radius
+
+
+@numba.njit(cache=True)
+def _moments(dipoles, start, stop):  # type: ignore[no-untyped-def]
+    sums = np.zeros((len(start), 3))
+    for node in range(len(start)):
+        for k in range(start[node], stop[node]):
+            for d in range(3):
+                sums[node, d] += dipoles[k, d]
+    return sums
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _dipole_sums(  # type: ignore[no-untyped-def]
+    first, last, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
+):
+    """-4 pi grad w = sum_j m_j / r^3 - 3 (m_j . d) d / r^5 and 4 pi w = sum_j m_j . d / r^3.
+
+    With d = p_j - x, r^2 = |d|^2 + eps^2 and m_j = a_j n_j.
+    """
+    stack = np.empty(STACK, np.int64)
+    for i in range(first, last):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        squared = eps[i] * eps[i]
+        gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0
+        stack[0] = 0
+        top = 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            dx, dy, dz = centre[node, 0] - x, centre[node, 1] - y, centre[node, 2] - z
+            r2 = dx * dx + dy * dy + dz * dz
+            if radius[node] * radius[node] < opening * opening * r2:
+                r2 += squared
+                cube = 1.0 / (r2 * np.sqrt(r2))
+                along = 3.0 * (dx * moments[node, 0] + dy * moments[node, 1] + dz * moments[node, 2]) * cube / r2
+                gx += moments[node, 0] * cube - along * dx
+                gy += moments[node, 1] * cube - along * dy
+                gz += moments[node, 2] * cube - along * dz
+                w += along * r2 / 3.0
+            elif child[node] >= 0:
+                stack[top] = child[node]
+                stack[top + 1] = child[node] + 1
+                top += 2
+            else:
+                for k in range(start[node], stop[node]):
+                    if k == i:
+                        continue
+                    dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
+                    r2 = dx * dx + dy * dy + dz * dz + squared
+                    cube = 1.0 / (r2 * np.sqrt(r2))
+                    along = 3.0 * (dx * dipoles[k, 0] + dy * dipoles[k, 1] + dz * dipoles[k, 2]) * cube / r2
+                    gx += dipoles[k, 0] * cube - along * dx
+                    gy += dipoles[k, 1] * cube - along * dy
+                    gz += dipoles[k, 2] * cube - along * dz
+                    w += along * r2 / 3.0
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = gx, gy, gz, w

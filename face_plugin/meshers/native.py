@@ -52,7 +52,10 @@ def run_native(
         np.savez(given, **arrays)  # type: ignore[arg-type]
         command = [sys.executable, "-m", "face_plugin.meshers._native_worker", library]
         command += [str(given), str(made), str(int(memory))]
-        child = subprocess.run(command, env=_environment(), capture_output=True, text=True, errors="replace")
+        # fTetWild writes a file __tracked_surface.stl to where it runs.
+        child = subprocess.run(
+            command, cwd=folder, env=_environment(), capture_output=True, text=True, errors="replace"
+        )
         if child.returncode == 0 and made.exists():
             with np.load(made) as archive:
                 return dict(archive)
@@ -61,7 +64,7 @@ def run_native(
 
 def _environment() -> dict[str, str]:
     """Copy the caller's environment, with its module path: the child must find the same packages."""
-    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    path = os.pathsep.join(map(os.path.abspath, sys.path))
     # Without the safe path a file tetgen.py in the working directory would be imported instead of the
     # library.
     return {**os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1"}

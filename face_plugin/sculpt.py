@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -160,6 +161,21 @@ class Sculptable(ABC):
             twin.add_cage_points(derived)
         if sculpt.charges:
             twin.add_charges(sculpt.charges)
+        return twin
+
+    def with_angles(self: Solved, angles: Literal["refined", "field"]) -> Solved:
+        """Return a copy with the other kind of normals (`Params.angles`); nothing is solved again.
+
+        Examples
+        --------
+        >>> from face_plugin import FaCE
+        >>> from face_plugin.shapes import sphere
+        >>> FaCE(sphere(500).points).with_angles("field").params.angles
+        'field'
+        """
+        twin = self.sculpted(SculptFile())
+        twin.params = dataclasses.replace(self.params, angles=angles)
+        twin._follow()
         return twin
 
     @cached_property

@@ -59,6 +59,8 @@ class Session:
     points : (n, 3) float
     mode : {"look", "carve", "shield"}
         What a click does.
+    automatic : bool
+        Whether points are interior as ``alpha="auto"`` has it, and not by `alpha` alone. Setting `alpha` ends it.
     plane : Plane
 
     Examples
@@ -85,26 +87,31 @@ class Session:
         first = SculptFile() if sculpt is None else sculpt
         first = first if isinstance(first, SculptFile) else SculptFile.load(first)
         self.points = as_points(points)
-        self._states = [FaCE(self.points, params, progress=progress).sculpted(first)]
+        solved = FaCE(self.points, params, progress=progress)
+        # Refining normals takes longer than an edit: they are refined when the surface is made.
+        self._angles = solved.params.angles
+        self._states = [solved.with_angles("field").sculpted(first)]
         self._now = 0
         self._alpha = self.face.proxy_level
+        self.automatic = self.face.params.alpha == "auto"
         self.mode: Mode = "look"
         self.plane = Plane()
-        self._flags: tuple[FaCE, float, NDArray[np.bool_]] | None = None
+        self._flags: tuple[FaCE, float | str, NDArray[np.bool_]] | None = None
 
     @property
     def face(self) -> FaCE:
-        """The cage with the present edits; another object after each of them."""
+        """The cage with the present edits, another object after each of them; its normals are the field's."""
         return self._states[self._now]
 
     @property
     def alpha(self) -> float:
-        """Field strength on the proxy, and below which points are interior; (0, 1)."""
+        """Field strength on the proxy and, unless `automatic`, below which points are interior; (0, 1)."""
         return self._alpha
 
     @alpha.setter
     def alpha(self, alpha: float) -> None:
         self._alpha = float(Params(alpha=alpha).alpha)
+        self.automatic = False
 
     def click(self, position: ArrayLike, normal: ArrayLike | None = None) -> tuple[Edit, ...]:
         """Do what `mode` says at a place that was clicked on.
@@ -169,9 +176,10 @@ class Session:
         self._now = len(self._states) - 1
 
     def interior(self) -> NDArray[np.bool_]:
-        """Which points (n,) lie inside the object, by the present field and `alpha`."""
-        if self._flags is None or self._flags[0] is not self.face or self._flags[1] != self.alpha:
-            self._flags = self.face, self.alpha, self.face.interior(self.alpha)
+        """Which points (n,) lie inside the object, by the present field."""
+        alpha = "auto" if self.automatic else self.alpha
+        if self._flags is None or self._flags[0] is not self.face or self._flags[1] != alpha:
+            self._flags = self.face, alpha, self.face.interior(alpha)
         return self._flags[2]
 
     def proxy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -179,9 +187,7 @@ class Session:
         vertices, faces = isosurface(*fill_balls(self.face.mesh, self.face.vertex_strength), self.alpha)
         return self.face.frame.from_unit(vertices), faces
 
-    def cut(
-        self, resolution: int = 128
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    def cut(self, resolution: int = 128) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
         """E_max on `plane`: vertices (k, 3) of a grid, its quads (q, 4), strength (k,)."""
         lower, upper = self.points.min(axis=0).astype(np.float64), self.points.max(axis=0).astype(np.float64)
         margin = MARGIN * float((upper - lower).max())
@@ -200,7 +206,8 @@ class Session:
     def surface(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Vertices and triangles of the Poisson surface of the points that are not interior."""
         kept = ~self.interior()
-        vertices, faces, _ = poisson_reconstruction(self.points[kept], self.face.normals()[kept], depth=DEPTH)
+        normals = self.face.with_angles(self._angles).normals()
+        vertices, faces, _ = poisson_reconstruction(self.points[kept], normals[kept], depth=DEPTH)
         return vertices, faces
 
     def save_sculpt(self, path: str | os.PathLike[str]) -> None:

@@ -81,7 +81,7 @@ class Viewer:
         self.message = "look: drag to turn, scroll to zoom"
         self.files = {"sculpt": str(sculpt_file), "mesh": str(mesh_file)}
         self._drawn: dict[str, Any] = {}
-        self._surface: tuple[FaCE, float] | None = None
+        self._surface: tuple[FaCE, float, bool] | None = None
         self._ps: Any = _window(headless)
         self._gui: Any = require("polyscope.imgui", extra="viewer")
         self._ps.set_window_size(*size)
@@ -127,12 +127,12 @@ class Viewer:
     def draw(self) -> None:
         """Bring the picture up to date; what has not changed is left alone."""
         face, alpha, plane = self.session.face, self.session.alpha, self.session.plane
-        self._update("points", (face, alpha), self._draw_points)
+        self._update("points", (face, alpha, self.session.automatic), self._draw_points)
         self._update("proxy", (face, alpha), self._draw_proxy)
         self._update("field", (face, plane), self._draw_field)
         self._update("edits", (face,), self._draw_edits)
         # A surface that does not go with the points any more would mislead.
-        if self._surface is not None and self._surface != (face, alpha):
+        if self._surface is not None and self._surface != (face, alpha, self.session.automatic):
             self._ps.remove_surface_mesh("surface", error_if_absent=False)
             self._surface = None
 
@@ -195,17 +195,15 @@ class Viewer:
         for mode in MODES:
             if gui.RadioButton(mode, session.mode == mode):
                 session.mode = mode
-                self.message = (
-                    f"{mode}: click on the proxy, a point or the field" if mode != "look" else "look"
-                )
+                self.message = f"{mode}: click on the proxy, a point or the field" if mode != "look" else "look"
             gui.SameLine()
         gui.NewLine()
-        changed, alpha = gui.SliderFloat(
-            "alpha", session.alpha, *ALPHA, "%.4f", gui.ImGuiSliderFlags_Logarithmic
-        )
+        changed, alpha = gui.SliderFloat("alpha", session.alpha, *ALPHA, "%.4f", gui.ImGuiSliderFlags_Logarithmic)
         if changed:
             with self._reporting():
                 session.alpha = alpha
+        gui.SameLine()
+        _, session.automatic = gui.Checkbox("auto", session.automatic)
         for label, act in (("undo", session.undo), ("redo", session.redo), ("clear", session.clear)):
             if gui.Button(label):
                 with self._reporting():
@@ -229,7 +227,7 @@ class Viewer:
             with self._reporting():
                 vertices, faces = session.surface()
                 self._ps.register_surface_mesh("surface", vertices, faces, color=MESH, smooth_shade=True)
-                self._surface = session.face, session.alpha
+                self._surface = session.face, session.alpha, session.automatic
                 self.message = f"{len(faces):,} triangles"
         gui.TextWrapped(self.message)
 

@@ -17,6 +17,7 @@ from face_plugin.cli import main
 from face_plugin.io import read_cloud
 from face_plugin.sculpt import SculptFile
 from face_plugin.session import Plane, Session
+from face_plugin.surface import poisson_reconstruction
 from face_plugin.view import Viewer
 
 SIZE = (900, 700)
@@ -44,7 +45,7 @@ class Spy:
 
     def __getattr__(self, name):
         real = getattr(imgui, name)
-        if name not in ("Button", "RadioButton", "SliderFloat", "Combo", "InputText"):
+        if name not in ("Button", "Checkbox", "RadioButton", "SliderFloat", "Combo", "InputText"):
             return real
 
         def drawn(label, *args):
@@ -211,6 +212,26 @@ def test_alpha_moves_the_proxy_and_the_interior(session):
     assert session.alpha == 0.1
 
 
+def test_automatic_is_what_face_mesh_does(session):
+    assert not session.automatic  # alpha was set
+    by_alpha = session.interior()
+    session.automatic = True
+    np.testing.assert_array_equal(session.interior(), session.face.interior("auto"))
+    session.automatic = False
+    np.testing.assert_array_equal(session.interior(), by_alpha)
+    assert Session(shapes.sphere(200).points).automatic
+
+
+def test_the_surface_is_of_refined_normals(session):
+    face = session.face
+    assert face.params.angles == "field"
+    refined = face.with_angles("refined")
+    assert not np.array_equal(refined.normals(), face.normals())
+    kept = ~session.interior()
+    vertices, _, _ = poisson_reconstruction(session.points[kept], refined.normals()[kept], depth=8)
+    np.testing.assert_allclose(session.surface()[0], vertices, atol=1e-6)
+
+
 def test_the_proxy_is_where_the_field_is_alpha(session):
     session.alpha = 0.05
     vertices, _ = session.proxy()
@@ -364,6 +385,8 @@ def test_sliders_and_buttons(hand, tmp_path):
     hand.press("field at", 0.22)
     assert 0.15 < session.plane.place < 0.35
     assert polyscope.get_surface_mesh("field").is_enabled()
+    hand.press("auto")
+    assert session.automatic
     hand.press("show surface")
     assert polyscope.has_surface_mesh("surface")
     assert "triangles" in viewer.message

@@ -66,11 +66,12 @@ def plot_interior(
     camera = Camera.around(points, view=view, up=up, margin=1.12)
     facing = Camera.around(points, view=_facing(section, up), up=up, margin=1.12)
     figure = new_figure(plt, 15.6, 8.4, title)
-    box = {"left": 0.045, "right": 0.99, "bottom": 0.02, "top": 0.89, "wspace": 0.06, "hspace": 0.1}
-    grid = figure.add_gridspec(2, 3, width_ratios=[1.35, 1, 1], **box)
-    _draw_section(plt, figure.add_subplot(grid[:, 0]), points, interior, meshes, section)
+    # Axis labels and the legend stand under the section, nothing under the renderings.
+    drawing = figure.add_gridspec(1, 1, left=0.045, right=0.41, bottom=0.16, top=0.89)
+    grid = figure.add_gridspec(2, 2, left=0.44, right=0.99, bottom=0.02, top=0.89, wspace=0.06, hspace=0.1)
+    _draw_section(plt, figure.add_subplot(drawing[0]), points, interior, meshes, section)
     names = (f"All {len(points):,} points", f"{int((~interior).sum()):,} points kept")
-    for column, (vertices, faces), name in zip((1, 2), meshes, names, strict=True):
+    for column, (vertices, faces), name in zip((0, 1), meshes, names, strict=True):
         whole = render_mesh(vertices, faces, camera=camera, size=pixels)
         show(figure.add_subplot(grid[0, column]), whole, name)
         cut = section.behind(vertices, faces)
@@ -100,13 +101,18 @@ def _draw_section(
         axes.scatter(flat[:, 0], flat[:, 1], s=7, c=colour, linewidths=0, label=name, zorder=3)
     across, upward, _ = section.labels
     share = f"{int(interior.sum()):,} of {len(points):,} points dropped"
-    axes.set(
-        xlabel=across, ylabel=upward, aspect="equal", title=f"{share}\nsection at {where(section, points)}"
-    )
+    axes.set(xlabel=across, ylabel=upward, aspect="equal", title=f"{share}\nsection at {where(section, points)}")
     axes.margins(0.06)
     axes.autoscale_view()
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, frameon=False, markerscale=2)
+    axes.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.225, 0.01),
+        bbox_transform=axes.figure.transFigure,
+        ncols=2,
+        frameon=False,
+        markerscale=2,
+    )
 
 
 def _facing(section: Section, up: Up) -> View:

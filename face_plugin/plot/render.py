@@ -51,9 +51,7 @@ class Camera:
     """Width and height of the picture, in the unit of the object."""
 
     @classmethod
-    def around(
-        cls, points: ArrayLike, *, view: View = (35.0, 20.0), up: Up = "z", margin: float = 1.06
-    ) -> Camera:
+    def around(cls, points: ArrayLike, *, view: View = (35.0, 20.0), up: Up = "z", margin: float = 1.06) -> Camera:
         """Look at all points from azimuth and elevation (degrees), with one axis pointing upward."""
         azimuth, elevation = np.radians(view)
         k = "xyz".index(up)

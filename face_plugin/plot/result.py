@@ -148,9 +148,7 @@ def _draw_slice(
     positions, extent = section.grid(points, 420)
     values = np.asarray(field(positions.reshape(-1, 3))).reshape(positions.shape[:2])
     norm = plt.Normalize(0.0, max(float(np.nanquantile(values, TOP)), 1e-12))
-    drawn = axes.imshow(
-        values, origin="lower", extent=extent, cmap="magma", norm=norm, interpolation="bilinear"
-    )
+    drawn = axes.imshow(values, origin="lower", extent=extent, cmap="magma", norm=norm, interpolation="bilinear")
     near = section.flatten(points[section.near(points, spacing)])
     axes.scatter(near[:, 0], near[:, 1], s=5, c="white", linewidths=0)
     if alpha is not None and np.nanmin(values) < alpha < np.nanmax(values):

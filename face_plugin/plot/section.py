@@ -36,9 +36,7 @@ class Section:
     """Coordinate that runs upward."""
 
     @classmethod
-    def through(
-        cls, points: Array, *, up: Up = "z", axis: Up | None = None, at: float | None = None
-    ) -> Section:
+    def through(cls, points: Array, *, up: Up = "z", axis: Up | None = None, at: float | None = None) -> Section:
         """Cut across `axis`, by default the object's shortest, in the middle of the points."""
         low, high = points.min(axis=0), points.max(axis=0)
         k = "xyz".index(axis) if axis is not None else int(np.argmin(high - low))
@@ -65,9 +63,7 @@ class Section:
         """Return the (k, 2) coordinates in the plane."""
         return points[:, [self.across, self.upward]]
 
-    def grid(
-        self, points: Array, pixels: int, margin: float = 0.12
-    ) -> tuple[Array, tuple[float, float, float, float]]:
+    def grid(self, points: Array, pixels: int, margin: float = 0.12) -> tuple[Array, tuple[float, float, float, float]]:
         """Return (rows, columns, 3) positions that cover the points, and (left, right, bottom, top)."""
         flat = self.flatten(points)
         low, high = flat.min(axis=0), flat.max(axis=0)

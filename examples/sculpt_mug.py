@@ -19,10 +19,10 @@ from face_plugin.shapes import cup
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--points", type=int, default=4000)
+    parser.add_argument("--points", type=int, default=5000)
     parser.add_argument("--out", type=Path, default=Path("out"))
     args = parser.parse_args()
-    mug = cup(args.points, depth=2.0)
+    mug = cup(args.points, depth=3.0)
     face = FaCE(mug.points)
     pictures = BeforeAfter(mug.points, mug.normals)
     pictures.add("before", face)

@@ -164,9 +164,7 @@ class PinnedPoisson:
             y[:, k] += step * direction[:, k]
             drawn[:, k] += step * response
             rest[:, k] -= step * response[place]
-        raise FaceError(
-            f"the potentials at {len(place)} vertices did not converge in {ITERATIONS} iterations"
-        )
+        raise FaceError(f"the potentials at {len(place)} vertices did not converge in {ITERATIONS} iterations")
 
     def _local_schur(self, place: NDArray[np.intp]) -> Operator:
         """Schur complement on `place` of the part of A near it."""

@@ -247,9 +247,7 @@ def test_every_answer_follows_an_edit(shell):
 def test_a_copy_has_edits_of_its_own(shell):
     original = shell[1]
     first = original.sculpted(SculptFile(charges=((0.0, 0.0, 0.0),)))
-    second = first.sculpted(
-        SculptFile(cage_points=(CagePoint((0.0, 0.0, 0.75)), CagePoint((0.0, 0.75, 0.0), 0.2)))
-    )
+    second = first.sculpted(SculptFile(cage_points=(CagePoint((0.0, 0.0, 0.75)), CagePoint((0.0, 0.75, 0.0), 0.2))))
     assert [len(f.edits) for f in (original, first, second)] == [0, 1, 3]
     first.clear_edits()
     assert len(second.edits) == 3
@@ -375,9 +373,7 @@ def test_radii_that_are_refused(shell, radius, message):
 
 def test_edits_follow_the_unit_and_the_place_of_the_input(shell):
     shape, face = shell
-    here = face.sculpted(
-        SculptFile(charges=((0.0, 0.0, 0.1),), cage_points=(CagePoint((0.0, 0.75, 0.0), 0.2),))
-    )
+    here = face.sculpted(SculptFile(charges=((0.0, 0.0, 0.1),), cage_points=(CagePoint((0.0, 0.75, 0.0), 0.2),)))
     shift = np.array([100.0, -200.0, 50.0])
     there = FaCE(shape.points * 1000 + shift).sculpted(
         SculptFile(

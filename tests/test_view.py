@@ -256,9 +256,7 @@ def test_the_field_is_cut_where_the_plane_says(session, axis):
     # Each quad is one cell of the grid.
     assert len(np.unique(np.sort(quads, axis=1), axis=0)) == 15 * 15
     edges = np.diff(vertices[quads[:, [0, 1, 2, 3, 0]]], axis=1)
-    np.testing.assert_allclose(
-        np.linalg.norm(edges, axis=2), np.linalg.norm(edges[0], axis=1)[None].repeat(225, 0)
-    )
+    np.testing.assert_allclose(np.linalg.norm(edges, axis=2), np.linalg.norm(edges[0], axis=1)[None].repeat(225, 0))
 
 
 def test_what_is_saved_can_be_used(session, tmp_path):
@@ -279,9 +277,7 @@ def test_a_bad_sculpt_file_is_said_before_the_cage_is_solved(tmp_path):
     stages = []
     (tmp_path / "edits.json").write_text("{}")
     with pytest.raises(ValueError, match="the field 'version' is missing"):
-        Session(
-            shapes.sphere(200).points, sculpt=tmp_path / "edits.json", progress=lambda *a: stages.append(a)
-        )
+        Session(shapes.sphere(200).points, sculpt=tmp_path / "edits.json", progress=lambda *a: stages.append(a))
     assert stages == []
 
 

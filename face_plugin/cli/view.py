@@ -31,12 +31,8 @@ def register(commands: Any) -> None:
         type=Path,
         help=f"where it saves the surface ({', '.join(MESH_SUFFIXES)}) [default: IN_mesh.ply]",
     )
-    parser.add_argument(
-        "--screenshot", metavar="PNG", type=Path, help="write a picture instead of opening a window"
-    )
-    parser.add_argument(
-        "--up", choices=("x", "y", "z"), default="z", help="the axis that points upward [default: z]"
-    )
+    parser.add_argument("--screenshot", metavar="PNG", type=Path, help="write a picture instead of opening a window")
+    parser.add_argument("--up", choices=("x", "y", "z"), default="z", help="the axis that points upward [default: z]")
     add_method(parser)
 
 

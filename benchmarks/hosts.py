@@ -40,7 +40,7 @@ def coplanar(n: int) -> shapes.Shape:
 SHAPES: dict[str, Cloud] = {
     "two disjoint spheres": shapes.disjoint_spheres,
     "slab, thickness 0.01": lambda n: shapes.slab(n, thickness=0.01),
-    "the same, a ball at every point": lambda n: shapes.slab(n, thickness=0.01),
+    "the same, ball at every point, field normals": lambda n: shapes.slab(n, thickness=0.01),
     "coplanar points": coplanar,
     "sphere": shapes.sphere,
     "torus": shapes.torus,
@@ -57,9 +57,11 @@ SHAPES: dict[str, Cloud] = {
     "two scans, 3 degrees off": shapes.doubled_shell,
 }
 
-# By default the cage leaves out points that are close, and with them one side of a plate thinner than the
-# spacing.
-PARAMS: dict[str, dict[str, Any]] = {"the same, a ball at every point": {"cage_spacing": 0.0}}
+# By default the cage leaves out points that are close, and planes are fitted to the nearest points: on a plate
+# thinner than the spacing both mix its two sides.
+PARAMS: dict[str, dict[str, Any]] = {
+    "the same, ball at every point, field normals": {"cage_spacing": 0.0, "angles": "field"}
+}
 
 
 class TimedFaCE(FaCE):

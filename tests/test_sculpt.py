@@ -3,9 +3,14 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, FaceError, Params, estimate_normals, pins, reconstruct, shapes
@@ -16,6 +21,7 @@ from face_plugin.sculpt import SculptFile
 from face_plugin.sculptfile import CagePoint
 from face_plugin.shapes import Shape
 
+EXAMPLES = Path(__file__).parents[1] / "examples"
 FIELD = Params(angles="field")
 
 
@@ -495,6 +501,29 @@ def test_a_bad_file_is_said_before_the_cage_is_solved(shell, tmp_path):
         with pytest.raises(ValueError, match="the field 'version' is missing"):
             run(shell[0].points, sculpt=tmp_path / "edits.json", progress=lambda *stage: stages.append(stage))
     assert stages == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "points", "files"),
+    [
+        ("sculpt_mug", 4000, {"sculpt_mug.png"}),
+        ("sculpt_gap", 3000, {"sculpt_gap.png"}),
+        ("sculpt_cavity", 1000, {"sculpt_cavity.png", "sculpt_cavity.json"}),
+    ],
+)
+def test_an_example_gets_better_and_leaves_its_picture(tmp_path, name, points, files):
+    command = [sys.executable, str(EXAMPLES / f"{name}.py"), "--points", str(points), "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == files
+    shares = [float(share) for share in re.findall(r": ([0-9.]+) %", done.stdout)]
+    # Measured over five seeds: at most 88.1 before, at least 98.6 after.
+    assert shares[0] < 92
+    assert shares[-1] > 97
+    image = np.asarray(Image.open(tmp_path / f"{name}.png").convert("L"))
+    for panel in np.array_split(image, 4, axis=1):
+        assert len(np.unique(panel)) > 50
 
 
 def test_the_cloud_stays_as_it_was(shell):

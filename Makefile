@@ -16,7 +16,7 @@ STAMP := $(VENV)/.installed
 
 # What the wheels load from the system: python (venv), scikit-sparse (compiler, SuiteSparse), Open3D, PyMeshLab, gmsh, polyscope.
 SYSTEM := python3-venv \
-	gcc g++ python3-dev libsuitesparse-dev \
+	gcc g++ python3-dev libsuitesparse-dev libopenblas0-pthread \
 	libgl1 libgomp1 libx11-6 libusb-1.0-0 \
 	libopengl0 libegl1 \
 	libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1 libfontconfig1

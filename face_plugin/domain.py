@@ -31,6 +31,8 @@ class Box:
     """(3,) lower corner."""
     upper: NDArray[np.float64]
     """(3,) upper corner."""
+    cells: int = COARSE_CELLS
+    """Cells that it is cut into along its longest side before refinement."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ def fill(
     """
     tree = cKDTree(balls.centres)
     side = box.upper - box.lower
-    cells = np.maximum(np.round(side / (side.max() / COARSE_CELLS)), 1).astype(np.int64)
+    cells = np.maximum(np.round(side / (side.max() / box.cells)), 1).astype(np.int64)
     cell = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
     inner, outer = [], []
     octants = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(1, 8, 3)

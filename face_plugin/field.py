@@ -40,32 +40,30 @@ def _vertex_gradients(vertices, tets, values):  # type: ignore[no-untyped-def]
     scenarios = values.shape[1]
     out = np.zeros((len(vertices), 3, scenarios))
     weight = np.zeros(len(vertices))
-    n = np.empty((4, 3))
-    g = np.empty((3, scenarios))
+    # Scalars throughout: an array for each edge vector would be allocated on the heap, and take four times as long.
     for t in range(len(tets)):
-        tet = tets[t]
-        a = vertices[tet[1]] - vertices[tet[0]]
-        b = vertices[tet[2]] - vertices[tet[0]]
-        c = vertices[tet[3]] - vertices[tet[0]]
-        n[1, 0], n[1, 1], n[1, 2] = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
-        n[2, 0], n[2, 1], n[2, 2] = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
-        n[3, 0], n[3, 1], n[3, 2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+        p, q, r, s = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
+        x, y, z = vertices[p, 0], vertices[p, 1], vertices[p, 2]
+        ax, ay, az = vertices[q, 0] - x, vertices[q, 1] - y, vertices[q, 2] - z
+        bx, by, bz = vertices[r, 0] - x, vertices[r, 1] - y, vertices[r, 2] - z
+        cx, cy, cz = vertices[s, 0] - x, vertices[s, 1] - y, vertices[s, 2] - z
+        n1x, n1y, n1z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        n2x, n2y, n2z = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+        n3x, n3y, n3z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
         # Six volumes times the gradient: the volume weight needs no division.
-        six = a[0] * n[1, 0] + a[1] * n[1, 1] + a[2] * n[1, 2]
-        for d in range(3):
-            for s in range(scenarios):
-                base = values[tet[0], s]
-                g[d, s] = (
-                    n[1, d] * (values[tet[1], s] - base)
-                    + n[2, d] * (values[tet[2], s] - base)
-                    + n[3, d] * (values[tet[3], s] - base)
-                )
-        for k in range(4):
-            v = tet[k]
+        six = ax * n1x + ay * n1y + az * n1z
+        for v in (p, q, r, s):
             weight[v] += six
-            for d in range(3):
-                for s in range(scenarios):
-                    out[v, d, s] += g[d, s]
+        for k in range(scenarios):
+            base = values[p, k]
+            dq, dr, ds = values[q, k] - base, values[r, k] - base, values[s, k] - base
+            gx = n1x * dq + n2x * dr + n3x * ds
+            gy = n1y * dq + n2y * dr + n3y * ds
+            gz = n1z * dq + n2z * dr + n3z * ds
+            for v in (p, q, r, s):
+                out[v, 0, k] += gx
+                out[v, 1, k] += gy
+                out[v, 2, k] += gz
     for v in range(len(vertices)):
         if weight[v] > 0:
             out[v] /= weight[v]
@@ -117,7 +115,7 @@ def _strength_exact(gradients):  # type: ignore[no-untyped-def]
 
 
 def half_icosahedron() -> NDArray[np.float64]:
-    """The paper's six directions (6, 3): one of each antipodal pair of an icosahedron's vertices (section 3.2).
+    """Return the paper's six directions (6, 3): one of each antipodal pair of an icosahedron's vertices (section 3.2).
 
     Examples
     --------
@@ -127,7 +125,7 @@ def half_icosahedron() -> NDArray[np.float64]:
     from face_plugin.cage import SOLIDS
 
     vertices = SOLIDS["icosahedron"]
-    return vertices[(vertices @ np.array([1.0, 0.1, 0.01])) > 0]
+    return np.asarray(vertices[(vertices @ np.array([1.0, 0.1, 0.01])) > 0])
 
 
 def strength_of_directions(

@@ -38,7 +38,7 @@ def ball_means(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def field_normals(mesh: CageMesh, strength: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Normal of each ball: the gradient of E_max, averaged over its cage vertices and normalised (paper equation 6).
+    """Average the gradient of E_max over the cage vertices of each ball, and normalise it (paper equation 6).
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def field_normals(mesh: CageMesh, strength: NDArray[np.float64]) -> NDArray[np.f
 def carry(
     centres: NDArray[np.float64], normals: NDArray[np.float64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Normals of points (n, 3) without a ball: those of the nearest balls, weighted by inverse distance.
+    """Give points (n, 3) without a ball normals: those of the nearest balls, weighted by inverse distance.
 
     A point that is a ball's centre keeps that ball's normal exactly.
 

@@ -77,7 +77,8 @@ class Params:
 
     # Interior
     alpha: float | Literal["auto", "dense", "sparse"] = "auto"
-    """Field strength (unshielded space has 1) below which space counts as inside; (0, 1); the names are 0.01 and 0.05."""
+    """Field strength (unshielded space has 1) below which space counts as inside; (0, 1). "dense" and "sparse" are the
+    paper's 0.01 and 0.05; "auto" derives it from the data and spares dents that are open to the outside."""
     inside: Literal["rays", "winding"] = "rays"
     """Test of a point against the isosurface: embree rays, or the winding number."""
 

@@ -148,4 +148,4 @@ def choose_quadric(
 
 def _ramp(values: NDArray[np.float64], ends: tuple[float, float]) -> NDArray[np.float64]:
     """0 at the first end, 1 at the second, linear between."""
-    return np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    return np.asarray(np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0))

@@ -137,7 +137,7 @@ class FaCE(Sculptable):
     def _point_strength(self) -> NDArray[np.float64]:
         """E_max at the balls nearest to the distinct points (m,)."""
         ball = cKDTree(self.balls.centres).query(self.cloud.points, workers=-1)[1]
-        return normals.ball_means(self.mesh, self.vertex_strength)[ball]
+        return np.asarray(normals.ball_means(self.mesh, self.vertex_strength)[ball])
 
     @cached_property
     def _field_normals(self) -> NDArray[np.float64]:
@@ -204,29 +204,34 @@ class FaCE(Sculptable):
         -------
         (n,) bool
         """
-        alpha = Params(alpha=self.params.alpha if alpha is None else alpha).alpha  # type: ignore[arg-type]
-        enclosed = self._enclosure if alpha == "auto" else None
+        level, enclosed = self._threshold(self.params.alpha if alpha is None else alpha)
         with self._stage("interior"):
-            if enclosed is not None:
-                level = interior.automatic_alpha(self._point_strength, enclosed)
-            else:
-                level = ALPHAS[alpha] if isinstance(alpha, str) else alpha
             inside = interior.shielded(
                 self.mesh, self.vertex_strength, self.cloud.points, level, self.params.inside
             )
             return interior.is_interior(inside, enclosed)[self.cloud.rows]
 
+    def _threshold(self, alpha: float | str) -> tuple[float, NDArray[np.float64] | None]:
+        """Alpha as a number and, where it is automatic, the enclosure (m,) that a point inside needs besides."""
+        alpha = Params(alpha=alpha).alpha  # type: ignore[arg-type]
+        if alpha == "auto":
+            return interior.automatic_alpha(self._point_strength, self._enclosure), self._enclosure
+        return (ALPHAS[alpha] if isinstance(alpha, str) else alpha), None
+
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
         dtype, rows = self.cloud.dtype, self.cloud.rows
         oriented = self.normals()
+        params = self.params
+        if filter_interior:
+            params = dataclasses.replace(params, alpha=self._threshold(params.alpha)[0])
         return Result(
             normals=oriented,
             strength=self._point_strength[rows].astype(dtype),
             confidence=confidence(self.cloud.points, self._field_normals, self._normals)[rows].astype(dtype),
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
-            params=self.params,
+            params=params,
         )
 
     @contextmanager
@@ -315,7 +320,7 @@ def reconstruct(
     engine: EngineLike = None,
     progress: Progress | None = None,
 ) -> Surface:
-    """Reconstruct the closed surface of an unoriented point cloud: normals, interior points dropped, Poisson reconstruction.
+    """Reconstruct a closed surface: outward normals, interior points dropped, Poisson reconstruction.
 
     Parameters
     ----------

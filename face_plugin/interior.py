@@ -23,13 +23,12 @@ from face_plugin.winding import DipoleTree
 
 __all__ = ["automatic_alpha", "enclosure", "is_interior", "shielded"]
 
-# Winding number above which a point is enclosed by the others: half way between the surface's 1/2 and the paper's
-# threshold of 0.9 lies 0.7; edges and bumps of an even sampling reach 0.75.
-ENCLOSED = 0.8
-# Width of the kernel of the winding number, in spacings.
-WIDTH = 0.5
-# Points this deep show how far the field leaks in; the threshold is this percentile of their strength, within bounds.
-DEEP = 0.9
+# Winding number above which a point is enclosed by the others: the paper's threshold. The surface itself has 1/2, its
+# concave edges 3/4.
+ENCLOSED = 0.9
+# Width of the kernel of the winding number, in spacings: a second layer within the noise is not an interior.
+WIDTH = 0.75
+# What is enclosed shows how far the field leaks in: alpha is this percentile of its strength, within the bounds.
 LEAK_PERCENTILE = 90.0
 ALPHA_BOUNDS = (ALPHAS["sparse"], 0.3)
 
@@ -76,7 +75,7 @@ def automatic_alpha(strength: NDArray[np.float64], enclosed: NDArray[np.float64]
     >>> automatic_alpha(np.array([1.0, 0.1]), np.array([0.5, 1.0]))
     0.1
     """
-    deep = strength[enclosed > DEEP]
+    deep = strength[enclosed > ENCLOSED]
     if len(deep) == 0:
         return ALPHA_BOUNDS[0]
     return float(np.clip(np.percentile(deep, LEAK_PERCENTILE), *ALPHA_BOUNDS))

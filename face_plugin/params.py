@@ -50,7 +50,7 @@ class Params:
     """Solid that approximates a ball: 6 or 12 vertices."""
     cage_spacing: float | None = None
     """Smallest distance between two balls, in the unit of the input; 0 = a ball at every point;
-    None = half the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings."""
+    None = 0.35 x the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings."""
 
     # Domain and mesh
     padding: float = 0.1

@@ -31,6 +31,15 @@ SIDE_BOUNDS = (0.3, 3.0)
 # A neighbour farther than this many spacings, within 37 degrees of the normal, belongs to another sheet.
 SHEET_DISTANCE = 1.2
 SHEET_COSINE = 0.8
+# A plate thinner than this many spacings: of PLATE_NEIGHBOURS at least PLATE_SHARE faces the other way, PLATE_BEHIND of
+# those lies behind the point, PLATE_PARALLEL of all is parallel to within 45 degrees, for most points around.
+PLATE_THICKNESS = 1.0
+PLATE_NEIGHBOURS = 24
+PLATE_SHARE = 0.25
+PLATE_BEHIND = 0.9
+PLATE_PARALLEL = 0.85
+PLATE_MAJORITY = 0.4
+SAME_LINE = 0.7
 # Angle: neighbours of the quadrics; a larger one is taken while its residual is below this multiple of the smallest's.
 QUADRICS = (12, 18, 30, 48)
 RESIDUAL_GROWTH = 1.35
@@ -81,11 +90,14 @@ def refine(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray
 
     reach = next_sheet(points, distance, neighbour, spacing)
     width = np.clip(SIDE_WIDTH * reach, SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing)
+    plate = back_to_back(points, normals, neighbour, spacing)
+    rough = normals
     for _ in range(SIDE_STEPS):
-        normals = unit(tree.outward(normals, width))
+        normals = np.where(plate[:, None], rough, unit(tree.outward(normals, width)))
     side = normals
 
     fitted, scatter = choose_quadric(points, normals, neighbour, spacing)
+    scatter[plate] = 1.0
     width = np.sqrt(np.maximum((NEAREST * spacing) ** 2 - distance[:, 1] ** 2, (ANGLE_WIDTH * spacing) ** 2))
     plane = plane_fit(points, distance, neighbour, min(PLANE[0], count - 1), PLANE[1])
     resolved = (1.0 - scatter)[:, None]
@@ -120,6 +132,35 @@ def next_sheet(
         hit = (along > SHEET_COSINE * distance[:, k]) & (distance[:, k] > SHEET_DISTANCE * spacing)
         np.minimum(reach, np.where(hit, distance[:, k], np.inf), out=reach)
     return reach
+
+
+def back_to_back(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    neighbour: NDArray[np.intp],
+    spacing: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Find the points (n,) of plates thinner than the spacing, which only the field can tell from noise.
+
+    In a plate about half of the neighbours face the other way, and nearly all of those lie behind the point, as it
+    lies behind them. Where points scatter about one sheet, few face the other way, and as many in front as behind. A
+    point belongs to a plate where most of its neighbours have this pattern, so that a plate's rim does, too.
+    """
+    near = neighbour[:, 1 : PLATE_NEIGHBOURS + 1]
+    facing = np.einsum("nkd,nd->nk", normals[near], normals)
+    offset = points[near] - points[:, None]
+    depth = -np.einsum("nkd,nd->nk", offset, normals)
+    behind = (depth > 0) & (np.einsum("nkd,nkd->nk", offset, normals[near]) > 0)
+    behind &= depth < PLATE_THICKNESS * spacing[:, None]
+    opposite = facing < -SAME_LINE
+    count = opposite.sum(axis=1)
+    parallel = (np.abs(facing) > SAME_LINE).mean(axis=1)
+    pattern = (
+        (count >= PLATE_SHARE * near.shape[1])
+        & ((opposite & behind).sum(axis=1) >= PLATE_BEHIND * count)
+        & (parallel > PLATE_PARALLEL)
+    )
+    return np.asarray(pattern[near].mean(axis=1) > PLATE_MAJORITY)
 
 
 def choose_quadric(

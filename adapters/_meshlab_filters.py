@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from face_plugin.adapters import _meshlab_layer as layers
 from face_plugin.adapters._meshlab_params import Parameter, common_parameters, params_of
 from face_plugin.adapters._meshlab_script import Element, kept_script
-from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
-
 from face_plugin.errors import MeshingError, require
+from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
 
 __all__ = ["FILTERS", "apply_by_name", "apply_step", "python_name"]
 

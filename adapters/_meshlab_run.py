@@ -8,7 +8,6 @@ from typing import Any
 
 from face_plugin.adapters._meshlab_filters import FILTERS, apply_by_name, apply_step, python_name
 from face_plugin.adapters._meshlab_script import Element, apply_host_step, load_steps, read_steps, steps_of
-
 from face_plugin.errors import require
 
 __all__ = ["register", "run_filter_script", "unregister"]

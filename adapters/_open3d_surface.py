@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from face_plugin.adapters._open3d_cloud import is_tensor, points_of
-from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
 from scipy.spatial import cKDTree
 
+from face_plugin.adapters._open3d_cloud import is_tensor, points_of
 from face_plugin.errors import require
+from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
 from face_plugin.params import Params
 
 __all__ = ["create_from_point_cloud_face"]

@@ -14,11 +14,11 @@ import logging
 from typing import Any
 
 import numpy as np
+
 from face_plugin.adapters._open3d_cloud import is_empty, points_of, select, set_normals
 from face_plugin.adapters._open3d_install import install, installed, uninstall
 from face_plugin.adapters._open3d_surface import create_from_point_cloud_face
 from face_plugin.filters import Interior, Normals, PointSet
-
 from face_plugin.params import Params
 
 __all__ = [

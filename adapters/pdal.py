@@ -17,9 +17,9 @@ from collections.abc import Callable, Mapping, MutableMapping
 from typing import Any
 
 import numpy as np
-from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet
 from numpy.typing import NDArray
 
+from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet
 from face_plugin.params import Params
 
 __all__ = ["configured", "estimate_normals", "remove_interior"]

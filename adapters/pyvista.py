@@ -14,9 +14,9 @@ import logging
 from typing import Any
 
 import numpy as np
-from face_plugin.filters import Normals, PointSet
 
 from face_plugin.errors import MissingDependencyError, require
+from face_plugin.filters import Normals, PointSet
 from face_plugin.params import Params
 from face_plugin.solver import reconstruct
 

@@ -12,9 +12,9 @@ import argparse
 from pathlib import Path
 
 import pymeshlab
-from face_plugin.adapters.pymeshlab import run_filter_script
 from panels import cloud_image, mesh_image, save_panels
 
+from face_plugin.adapters.pymeshlab import run_filter_script
 from face_plugin.shapes import demo_shape
 
 

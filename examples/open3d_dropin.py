@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import open3d as o3d
-from face_plugin.adapters.open3d import installed
 from panels import aligned, mesh_image, save_panels
 
+from face_plugin.adapters.open3d import installed
 from face_plugin.shapes import disjoint_spheres
 
 

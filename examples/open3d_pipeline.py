@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import open3d as o3d
-from face_plugin.adapters import open3d as face
 from panels import mesh_image, save_panels
 
+from face_plugin.adapters import open3d as face
 from face_plugin.shapes import demo_shape
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
 from face_plugin.filters.pointset import PointSet
-
 from face_plugin.params import Params
 from face_plugin.solver import Progress
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from face_plugin.errors import FaceError
 from face_plugin.filters.base import Filter
 from face_plugin.filters.interior import Interior
 from face_plugin.filters.normals import Normals
@@ -19,8 +20,6 @@ from face_plugin.filters.pointset import PointSet
 from face_plugin.filters.sculpt import Sculpt
 from face_plugin.filters.surface import Surface
 from face_plugin.filters.thin import Thin
-
-from face_plugin.errors import FaceError
 from face_plugin.solver import Progress
 
 __all__ = ["FILTERS", "Chain"]

@@ -9,10 +9,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from face_plugin.filters.tiled import Tiled
 from numpy.typing import NDArray
 
 from face_plugin.cloud import as_points
+from face_plugin.filters.tiled import Tiled
 from face_plugin.params import Params
 from face_plugin.solver import FaCE, Progress
 from face_plugin.tiles.choose import in_tiles

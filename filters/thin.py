@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from face_plugin.filters.base import Filter
-from face_plugin.filters.pointset import PointSet
 
 from face_plugin.cage import thin
+from face_plugin.filters.base import Filter
+from face_plugin.filters.pointset import PointSet
 from face_plugin.solver import Progress
 
 __all__ = ["Thin"]

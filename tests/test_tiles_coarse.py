@@ -5,6 +5,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from face_plugin import Params, field
+from face_plugin.cage import separation
+from face_plugin.domain import Box
 from face_plugin.locate import Locator
 from face_plugin.normals import ball_means
 from face_plugin.poisson import Poisson
@@ -12,8 +14,9 @@ from face_plugin.shapes import demo_shape, sphere
 from face_plugin.tiles.coarse import Coarse, Voxels, solve_coarse, voxel_size
 from face_plugin.tiles.level import solve_level
 from face_plugin.tiles.prepare import fill_store
-from face_plugin.tiles.solve import HALO, tile_cage
+from face_plugin.tiles.solve import HALO
 from face_plugin.tiles.sources import ArraySource
+from face_plugin.tiles.surroundings import surroundings
 
 RNG = np.random.default_rng(1)
 
@@ -66,14 +69,19 @@ def test_the_error_of_the_transfer_decays_with_the_halo(tmp_path):
 
     def strength(part, around):
         level = solve_level(
-            part.points, part.separation, params, box=part.box, given=around.at, cage_value=around.cage_value
+            part.points,
+            separation(part.points, None),
+            params,
+            box=Box(part.lower - part.spacing, part.upper + part.spacing),
+            given=around.at,
+            cage_value=around.cage_value,
         )
         at_balls = ball_means(level.mesh, field.strength(level.mesh, level.potential, "exact"))
         return at_balls[cKDTree(level.balls.centres).query(part.points[part.own])[1]]
 
     errors = []
     for halo in (1.0, 3.0, HALO):
-        part = tile_cage(store, 1, halo)
+        part = surroundings(store, 1, halo)
         given, true = strength(part, coarse), strength(part, exact)
         visible = true > 0.05
         errors.append(np.abs(given / true - 1)[visible].mean())

@@ -14,7 +14,7 @@ from face_plugin.meshers import CageMesh
 from face_plugin.params import Params
 from face_plugin.tiles.level import Clock, solve_level
 
-__all__ = ["Coarse", "Voxels", "solve_coarse", "voxel_size"]
+__all__ = ["Coarse", "Voxels", "nearest_to_centres", "solve_coarse", "voxel_size"]
 
 # Occupied voxels a point of the coarse cage: thinning them at THINNING voxels leaves about this share.
 VOXELS_PER_POINT = 1.7
@@ -52,11 +52,25 @@ class Voxels:
     def add(self, points: NDArray[np.float64]) -> None:
         """Take the next part (n, 3) of the cloud into account; the order of the parts does not matter."""
         every = np.concatenate([self.points, points])
-        code, offset = _voxel(every, self.origin, self.size)
-        # Ties go by the coordinates, so that the order of the points does not matter either.
-        order = np.lexsort((every[:, 2], every[:, 1], every[:, 0], offset, code))
-        first = np.concatenate([[True], np.diff(code[order]) != 0])
-        self.points = every[order[first]]
+        self.points = every[nearest_to_centres(every, self.origin, self.size)]
+
+
+def nearest_to_centres(
+    points: NDArray[np.float64], origin: NDArray[np.float64], size: float
+) -> NDArray[np.intp]:
+    """Rows of the points (n, 3), one in each voxel that any lies in: the one nearest to its centre.
+
+    Examples
+    --------
+    >>> nearest_to_centres(np.array([[0.1, 0.5, 0.5], [0.4, 0.5, 0.5], [1.5, 0.5, 0.5]]), np.zeros(3), 1.0)
+    array([1, 2])
+    """
+    if len(points) == 0:
+        return np.empty(0, dtype=np.intp)
+    code, offset = _voxel(points, origin, size)
+    # Ties go by the coordinates: the order of the points does not matter.
+    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0], offset, code))
+    return np.asarray(order[np.concatenate([[True], np.diff(code[order]) != 0])])
 
 
 def _voxel(

@@ -28,6 +28,8 @@ SAMPLE = 1_000_000
 # Points of the coarse cage: one in COARSE_SHARE, within these limits.
 COARSE_SHARE = 20
 COARSE_POINTS = (500, 6_000)
+# Beyond that many points for each of the coarse ones, these become more.
+MOST_A_COARSE = 500
 
 # Settings that decide how the work is done and not what comes out.
 _NOT_IN_KEY = ("max_memory", "engine", "workers")
@@ -83,11 +85,13 @@ def fill_store(
         The cloud is not finite, or too small or flat, as `face_plugin.cloud.prepare` says.
     """
     sample = _sample(source, chunk)
-    frame = cloud.prepare(sample).frame
+    prepared = cloud.prepare(sample)
+    frame, plane = prepared.frame, prepared.plane_normal() if prepared.flat else None
+    del prepared
     progress(0.25)
     unit_sample = frame.to_unit(sample)
     partition = split(unit_sample, max(1, round(source.count / tile_points)))
-    target = int(np.clip(source.count // COARSE_SHARE, *COARSE_POINTS))
+    target = max(int(np.clip(source.count // COARSE_SHARE, *COARSE_POINTS)), source.count // MOST_A_COARSE)
     size = voxel_size(unit_sample, int(VOXELS_PER_POINT * target))
     # The sample may miss the outermost points: voxels start below any that there can be.
     origin = unit_sample.min(axis=0) - 1000 * size
@@ -95,7 +99,8 @@ def fill_store(
     progress(0.5)
     start = np.concatenate([[0], np.cumsum(count)])
     dtype = cloud.as_points(np.empty((0, 3), source.dtype)).dtype
-    store = Store(folder, params, frame, start, bounds, dtype, interior, key)
+    store = Store(folder, params, frame, start, bounds, dtype, interior, key, size, plane)
+    np.savez(folder / "voxels.npz", points=voxels.points, tile=partition.assign(voxels.points))
     _place(store, source, partition, chunk)
     progress(1.0)
     log.info("%d points in %d tiles", store.count, store.tiles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import tempfile
 import time
@@ -13,13 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from face_plugin import cloud
-from face_plugin.params import Params
+from face_plugin import cloud, interior
+from face_plugin.params import ALPHAS, Params
 from face_plugin.solver import Progress, Result
 from face_plugin.tiles.choose import EngineLike, make_engine, tile_size
 from face_plugin.tiles.coarse import solve_coarse
 from face_plugin.tiles.engines import Engine, Job
+from face_plugin.tiles.polish import POLISH_STAGES, polish_tile
 from face_plugin.tiles.prepare import fill_store, store_key
+from face_plugin.tiles.scene import write_far
 from face_plugin.tiles.solve import TILE_STAGES, solve_tile
 from face_plugin.tiles.sources import CHUNK, ArraySource, Source
 from face_plugin.tiles.store import Store
@@ -76,9 +79,11 @@ def estimate_tiled(
     source = ArraySource(cloud.as_points(points))
     with tempfile.TemporaryDirectory(prefix="face-") as folder:
         store, timings = solve_store(
-            Path(folder), source, params, interior=filter_interior, engine=engine, progress=progress
+            Path(folder), source, params, classify=filter_interior, engine=engine, progress=progress
         )
         found = collect(store)
+        if filter_interior:
+            params = dataclasses.replace(params, alpha=interior_alpha(store))
         return Result(
             normals=found["normals"],
             strength=found["strength"],
@@ -94,7 +99,7 @@ def solve_store(
     source: Source,
     params: Params,
     *,
-    interior: bool = False,
+    classify: bool = False,
     engine: EngineLike = None,
     resume: bool = False,
     chunk: int = CHUNK,
@@ -108,8 +113,8 @@ def solve_store(
         Exists; with Dask, at the same place for all workers.
     source : Source
     params : Params
-    interior : bool
-        Also classify the points.
+    classify : bool
+        Also tell which points lie inside.
     engine : str, Engine or distributed.Client, optional
     resume : bool
         Go on from what the folder holds.
@@ -140,19 +145,21 @@ def solve_store(
         report(stage, 1.0)
         return value
 
-    key = store_key(source, params, interior)
+    key = store_key(source, params, classify)
     store = _found(folder, key) if resume else None
     points = tile_size(source.count, params)
     with make_engine(engine, params, points, source.count) as running:
         if store is None:
             fill = partial(
-                fill_store, folder, source, params, points, interior=interior, key=key, chunk=chunk
+                fill_store, folder, source, params, points, interior=classify, key=key, chunk=chunk
             )
             store, voxels = timed("cloud", fill)
             timed("coarse", lambda: solve_coarse(voxels, params).save(folder))
             store.save()
         solved: Store = store
-        timed("tiles", lambda: _run(running, solve_tile, solved, "field", report))
+        timed("tiles", lambda: _run(running, solve_tile, solved, "field", "tiles", report))
+        write_far(solved)
+        timed("normals", lambda: _run(running, polish_tile, solved, "normals", "normals", report))
     return store, timings
 
 
@@ -169,8 +176,8 @@ def _found(folder: Path, key: str) -> Store | None:
     return store
 
 
-def _run(engine: Engine, job: Job, store: Store, stage: str, report: Progress) -> None:
-    """Run a job on the tiles that a stage has not finished."""
+def _run(engine: Engine, job: Job, store: Store, stage: str, name: str, report: Progress) -> None:
+    """Run a job on the tiles that a stage has not finished; it is reported as `name`."""
     left = [tile for tile in range(store.tiles) if not store.done(tile, stage)]
     if len(left) < store.tiles:
         log.info("%d of %d tiles are done already", store.tiles - len(left), store.tiles)
@@ -179,7 +186,7 @@ def _run(engine: Engine, job: Job, store: Store, stage: str, report: Progress) -
     def done(tile: int) -> None:
         nonlocal remaining
         remaining -= 1
-        report("tiles", 1.0 - remaining / store.tiles)
+        report(name, 1.0 - remaining / store.tiles)
 
     # The largest first: the last ones to finish then keep no worker waiting for long.
     left.sort(key=lambda tile: (store.start[tile] - store.start[tile + 1], tile))
@@ -217,16 +224,41 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
 
     out = {name: empty(name) for name in kinds}
     rows = store.rows()
+    alpha = interior_alpha(store) if store.interior else 0.0
     for tile in range(store.tiles):
         row = rows[store.start[tile] : store.start[tile + 1]]
-        found = store.read(tile, "field")
-        found["normals"] = store.frame.unrotate(found["normals"])
-        for name, values in out.items():
-            values[row] = found[name]
+        polished = store.read(tile, "normals")
+        solved = store.read(tile, "field")
+        out["normals"][row] = store.frame.unrotate(polished["normals"])
+        out["confidence"][row] = polished["confidence"]
+        out["strength"][row] = solved["strength"]
+        if store.interior:
+            enclosed = polished["enclosed"] if store.params.alpha == "auto" else None
+            out["interior"][row] = interior.is_interior(solved["level"] < alpha, enclosed)
     return out
+
+
+def interior_alpha(store: Store) -> float:
+    """Field strength below which space is shielded: given, or what the whole cloud shows."""
+    alpha = store.params.alpha
+    if alpha != "auto":
+        return ALPHAS[alpha] if isinstance(alpha, str) else alpha
+    strength, enclosed = [], []
+    for tile in range(store.tiles):
+        around = store.read(tile, "normals", "enclosed")["enclosed"]
+        # What is not enclosed does not count, and need not be kept.
+        deep = np.flatnonzero(around > interior.ENCLOSED)
+        strength.append(store.read(tile, "field", "strength")["strength"][deep])
+        enclosed.append(around[deep])
+    return interior.automatic_alpha(np.concatenate(strength), np.concatenate(enclosed))
 
 
 def tile_seconds(store: Store) -> dict[str, float]:
     """Seconds by stage that the tiles took, all together."""
-    seconds = sum(store.read(tile, "field")["seconds"] for tile in range(store.tiles))
-    return dict(zip(TILE_STAGES, np.asarray(seconds).tolist(), strict=True))
+    seconds: dict[str, float] = {}
+    for stage, names in (("field", TILE_STAGES), ("normals", POLISH_STAGES)):
+        for tile in range(store.tiles):
+            for name, value in zip(names, store.read(tile, stage, "seconds")["seconds"], strict=True):
+                label = f"tiles: {name}"
+                seconds[label] = seconds.get(label, 0.0) + float(value)
+    return seconds

@@ -52,8 +52,14 @@ class Store:
         Lower and upper corner of each tile's points.
     dtype : dtype
         Floating-point type of the input.
+    interior : bool
+        Whether the points are to be classified.
     key : str
         Hash of the input and the settings.
+    voxel : float
+        Edge of the voxels of which the coarse level has a point each.
+    plane : (3,) float64 or None
+        The normal of a cloud that lies in one plane.
     """
 
     folder: Path
@@ -64,6 +70,8 @@ class Store:
     dtype: np.dtype[Any]
     interior: bool
     key: str
+    voxel: float
+    plane: NDArray[np.float64] | None = None
 
     @property
     def tiles(self) -> int:
@@ -89,6 +97,8 @@ class Store:
                 "bounds": self.bounds.tolist(),
                 "dtype": self.dtype.name,
                 "interior": self.interior,
+                "voxel": self.voxel,
+                "plane": None if self.plane is None else self.plane.tolist(),
             }
         )
         temporary = self.folder / f"store.{secrets.token_hex(4)}.tmp"
@@ -119,6 +129,8 @@ class Store:
             dtype=np.dtype(text["dtype"]),
             interior=text["interior"],
             key=text["key"],
+            voxel=text["voxel"],
+            plane=None if text["plane"] is None else np.array(text["plane"]),
         )
 
     def points(self, mode: Any = "r") -> NDArray[np.float64]:
@@ -131,6 +143,11 @@ class Store:
 
     def _map(self, name: str, mode: Any) -> NDArray[Any]:
         return np.asanyarray(np.load(self.folder / name, mmap_mode=mode))
+
+    def voxels(self, tile: int) -> NDArray[np.float64]:
+        """Points (k, 3) of the coarse level that a tile owns."""
+        with np.load(self.folder / "voxels.npz") as arrays:
+            return np.asarray(arrays["points"][arrays["tile"] == tile])
 
     def tile_points(self, tile: int) -> NDArray[np.float64]:
         """Points (k, 3) that a tile owns."""
@@ -160,16 +177,20 @@ class Store:
 
     def write(self, tile: int, stage: str, **arrays: NDArray[Any]) -> None:
         """Write what a stage found out about a tile, whole or not at all."""
-        temporary = self.folder / f"{stage}-{tile:06d}.{secrets.token_hex(4)}.tmp"
+        self.write_whole(self.path(tile, stage).stem, **arrays)
+
+    def write_whole(self, name: str, **arrays: NDArray[Any]) -> None:
+        """Write arrays to a file of the store, whole or not at all."""
+        temporary = self.folder / f"{name}.{secrets.token_hex(4)}.tmp"
         try:
             with open(temporary, "wb") as stream:
                 np.savez(stream, allow_pickle=False, **arrays)
-            os.replace(temporary, self.path(tile, stage))
+            os.replace(temporary, self.folder / f"{name}.npz")
         finally:
             temporary.unlink(missing_ok=True)
 
-    def read(self, tile: int, stage: str) -> dict[str, NDArray[Any]]:
-        """Read it back."""
+    def read(self, tile: int, stage: str, *names: str) -> dict[str, NDArray[Any]]:
+        """Read it back: what is named, or all of it."""
         with np.load(self.path(tile, stage)) as arrays:
-            return {name: arrays[name] for name in arrays.files}
+            return {name: arrays[name] for name in names or arrays.files}
 

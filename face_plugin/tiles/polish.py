@@ -1,0 +1,66 @@
+"""The second stage of a tile: what only the oriented points together can tell."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from face_plugin import interior
+from face_plugin.confidence import confidence
+from face_plugin.refine import refine
+from face_plugin.tiles.scene import scene
+from face_plugin.tiles.solve import one_at_a_time
+from face_plugin.tiles.store import Store
+
+__all__ = ["POLISH_STAGES", "polish_tile"]
+
+POLISH_STAGES = ("scene", "refine", "enclosure", "confidence")
+
+
+def polish_tile(folder: str, tile: int) -> int:
+    """Refine the normals of one tile of a store, and tell how far they can be trusted and what is enclosed.
+
+    Parameters
+    ----------
+    folder : str
+        Of the store; the first stage of all its tiles is done.
+    tile : int
+
+    Returns
+    -------
+    int
+        The tile's number.
+    """
+    store = Store.load(Path(folder))
+    if not store.done(tile, "normals"):
+        with one_at_a_time, threadpool_limits(1):
+            store.write(tile, "normals", **_polish(store, tile))
+    return tile
+
+
+def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
+    seconds: list[float] = []
+    start = time.perf_counter()
+
+    def clock() -> None:
+        seconds.append(time.perf_counter() - start - sum(seconds))
+
+    seen = scene(store, tile)
+    clock()
+    normals = seen.normals
+    if store.plane is not None:
+        normals = np.tile(store.plane, (len(seen.points), 1))
+    elif store.params.angles == "refined":
+        normals = refine(seen.points, normals)
+    clock()
+    found = {"normals": normals[seen.own]}
+    if store.interior:
+        found["enclosed"] = interior.enclosure(seen.points, normals, seen.strength)[seen.own]
+    clock()
+    found["confidence"] = confidence(seen.points, seen.normals, normals)[seen.own]
+    clock()
+    return {**found, "seconds": np.array(seconds)}

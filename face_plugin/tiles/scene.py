@@ -1,0 +1,116 @@
+"""What the second stage of a tile sees: its ring in full, and the rest of the cloud the coarser the farther.
+
+Winding numbers need the whole surface, but dipoles far away may stand for one another: points are thinned to
+a fixed share of their distance. Those of the tiles around come from these; beyond, the points of the coarse
+level do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin import cloud
+from face_plugin.normals import unit
+from face_plugin.tiles.coarse import nearest_to_centres
+from face_plugin.tiles.store import Store
+from face_plugin.tiles.surroundings import surroundings
+
+__all__ = ["Scene", "scene", "write_far"]
+
+# Width of the full ring around a tile, in its spacings.
+WIDTH = 8.0
+# Size of the voxels that are left a point, as a share of the distance to the tile.
+SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Distinct points in Morton order, with what the first stage found out."""
+
+    points: NDArray[np.float64]
+    """(n, 3) in the canonical frame."""
+    normals: NDArray[np.float64]
+    """(n, 3) gradients of the field strength."""
+    strength: NDArray[np.float64]
+    """(n,) E_max."""
+    own: NDArray[np.intp]
+    """(k,) the row of each point that the tile owns."""
+
+
+def write_far(store: Store) -> None:
+    """Bring together what the first stage found out at the points of the coarse level."""
+    normals, strength, points = [], [], []
+    for tile in range(store.tiles):
+        found = store.read(tile, "field", "voxel_rows", "normals", "strength")
+        rows = found["voxel_rows"]
+        points.append(store.voxels(tile))
+        normals.append(found["normals"][rows])
+        strength.append(found["strength"][rows])
+    store.write_whole(
+        "far", points=np.concatenate(points), normals=np.concatenate(normals), strength=np.concatenate(strength)
+    )
+
+
+@lru_cache(maxsize=1)
+def _far(folder: Path, key: str) -> dict[str, NDArray[np.float64]]:
+    with np.load(folder / "far.npz") as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
+
+def scene(store: Store, tile: int) -> Scene:
+    """Collect what the second stage of a tile needs.
+
+    Parameters
+    ----------
+    store : Store
+        The first stage of all its tiles is done.
+    tile : int
+    """
+    near = surroundings(store, tile, WIDTH)
+    reach = WIDTH * near.spacing
+    middle = store.within(near.lower - store.voxel / SHARE, near.upper + store.voxel / SHARE)
+    far = _far(store.folder, store.key)
+
+    def outside(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.maximum(np.maximum(near.lower - points, points - near.upper), 0.0).max(axis=1))
+
+    distance = outside(middle.points)
+    rows = _thinned(middle.points, distance, reach)
+    beyond = np.flatnonzero(outside(far["points"]) > store.voxel / SHARE)
+    beyond = beyond[_thinned(far["points"][beyond], outside(far["points"][beyond]), reach)]
+
+    tiles = np.concatenate([near.tile, middle.tile[rows]])
+    row_in_tile = np.concatenate([near.row, middle.row[rows]])
+    normals = np.empty((len(tiles), 3))
+    strength = np.empty(len(tiles))
+    for other in np.unique(tiles):
+        mine = tiles == other
+        found = store.read(int(other), "field", "normals", "strength")
+        normals[mine] = found["normals"][row_in_tile[mine]]
+        strength[mine] = found["strength"][row_in_tile[mine]]
+    points = np.concatenate([near.points, middle.points[rows], far["points"][beyond]])
+    normals = np.concatenate([normals, far["normals"][beyond]])
+    strength = np.concatenate([strength, far["strength"][beyond]])
+    order, leads = cloud.morton_distinct(points)
+    place = np.empty(len(order), dtype=np.intp)
+    place[order] = np.cumsum(leads) - 1
+    kept = order[leads]
+    return Scene(points[kept], unit(normals[kept]), strength[kept], place[near.own])
+
+
+def _thinned(points: NDArray[np.float64], distance: NDArray[np.float64], reach: float) -> NDArray[np.intp]:
+    """Rows left of points at these distances outside a box that itself reaches so far: octave by octave."""
+    rows = [np.empty(0, dtype=np.intp)]
+    near = reach
+    farthest = reach + (float(distance.max()) if len(distance) else 0.0)
+    while near <= farthest:
+        # `distance` counts from the box, `near` from the tile in it.
+        octave = np.flatnonzero((distance > near - reach) & (distance <= 2 * near - reach))
+        rows.append(octave[nearest_to_centres(points[octave], np.full(3, -1.0), SHARE * near)])
+        near *= 2.0
+    return np.concatenate(rows)

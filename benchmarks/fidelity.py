@@ -130,7 +130,7 @@ def main() -> int:
     (options.output / "fidelity.json").write_text(json.dumps([HEADER, *rows], indent=0))
     print(table(HEADER, rows), "", PAPER, "", sep="\n")
     print(
-        f"Median angle of default and paper's mesh below {MEDIAN:g} degrees, same side at {SAME_SIDE:g} % of the points: "
+        f"Median angle of default and paper's mesh below {MEDIAN:g} degrees, same side of {SAME_SIDE:g} %: "
         + (f"not on {', '.join(disagree)}" if disagree else "on every clean cloud")
     )
     return 1 if disagree else 0

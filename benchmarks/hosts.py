@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 import open3d as o3d
 import pymeshlab
-from face_plugin.adapters import open3d as face
-from face_plugin.adapters import pymeshlab as faraday
-from face_plugin.filters import pointset
 from scipy.spatial import cKDTree
 
 import face_plugin
 from face_plugin import FaCE, Params, shapes
+from face_plugin.adapters import open3d as face
+from face_plugin.adapters import pymeshlab as faraday
+from face_plugin.filters import pointset
 from face_plugin.surface import poisson_reconstruction
 
 Cloud = Callable[[int], shapes.Shape]

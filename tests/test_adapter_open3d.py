@@ -7,9 +7,9 @@ import sys
 
 import numpy as np
 import pytest
-from face_plugin.adapters import open3d as face
 
 from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin.adapters import open3d as face
 from face_plugin.shapes import nested_box, slab, torus
 
 o3d = pytest.importorskip("open3d")

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from face_plugin.adapters.open3d import install, installed, uninstall
 
 from face_plugin import Params, estimate_normals
+from face_plugin.adapters.open3d import install, installed, uninstall
 from face_plugin.shapes import disjoint_spheres
 
 o3d = pytest.importorskip("open3d")

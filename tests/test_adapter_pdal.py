@@ -4,9 +4,9 @@ import inspect
 
 import numpy as np
 import pytest
-from face_plugin.adapters import pdal
 
 from face_plugin import Params, estimate_normals
+from face_plugin.adapters import pdal
 from face_plugin.shapes import nested_box, torus
 
 SHAPE = torus(600)

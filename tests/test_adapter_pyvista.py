@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 import pytest
-from face_plugin.adapters import pyvista as adapter
 
 from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin.adapters import pyvista as adapter
 from face_plugin.shapes import torus
 
 pv = pytest.importorskip("pyvista", minversion="0.48")

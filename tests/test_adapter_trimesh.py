@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from face_plugin.adapters import trimesh as adapter
 
 from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin.adapters import trimesh as adapter
 from face_plugin.shapes import torus
 
 trimesh = pytest.importorskip("trimesh")

@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
-from face_plugin.filters.base import Filter
 
 from face_plugin import Params
 from face_plugin.errors import MeshingError
+from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
+from face_plugin.filters.base import Filter
 
 CHAIN = Chain(
     [

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from face_plugin.filters import PointSet
 
+from face_plugin.filters import PointSet
 from face_plugin.params import Params
 from face_plugin.shapes import sphere
 

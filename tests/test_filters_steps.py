@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
 from scipy.spatial import cKDTree
 
 from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
 from face_plugin.sculpt import SculptFile
 from face_plugin.shapes import nested_box, spherical_shell, torus
 

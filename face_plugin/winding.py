@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 __all__ = ["DipoleTree"]
 
 LEAF = 8
-# A group acts as one dipole where its radius is below this fraction of the distance: the error in the direction of
-# the gradient is then below 0.5 degrees, on points where the exact sum and the tree were compared.
-OPENING = 0.5
+# A group acts as one dipole where its radius is below this fraction of the distance. Mean error in the direction of the
+# gradient against the exact sum, on even samplings: 0.2 to 0.6 degrees at 0.4, 0.4 to 1.2 at 0.5, 1.3 to 3 at 0.7.
+OPENING = 0.4
 # Deep enough for 2**48 leaves.
 STACK = 100
 
@@ -50,7 +50,9 @@ class DipoleTree:
         self.areas = np.ascontiguousarray(areas)
         self._start, self._stop, self._child, self._centre, self._radius = _build(self.points, self.areas, LEAF)
 
-    def outward(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
+    def outward(
+        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
+    ) -> NDArray[np.float64]:
         """Steepest descent -grad w of the winding number at each point, of the dipoles of all the others.
 
         A point's own dipole is left out: it would vote for the normal that the point has.
@@ -60,22 +62,26 @@ class DipoleTree:
         normals : (n, 3) float64
         eps : (n,) float64
             Width of the kernel at each point, > 0.
+        opening : float, in [0, 1)
+            Groups of points act as one where their radius is below this fraction of their distance; 0 is exact.
 
         Returns
         -------
         (n, 3) float64
             Times 4 pi.
         """
-        return self._evaluate(normals, eps)[:, :3]
+        return self._evaluate(normals, eps, opening)[:, :3]
 
     def number(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
         """Winding number (n,) at each point, of the dipoles of all the others; arguments as in `outward`.
 
         About 1/2 at a point of the surface, 1 inside it and 0 outside.
         """
-        return self._evaluate(normals, eps)[:, 3] / (4.0 * np.pi)
+        return self._evaluate(normals, eps, OPENING)[:, 3] / (4.0 * np.pi)
 
-    def _evaluate(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _evaluate(
+        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float
+    ) -> NDArray[np.float64]:
         """Columns of -4 pi grad w, and 4 pi w."""
         dipoles = np.ascontiguousarray(normals * self.areas[:, None])
         moments = _moments(dipoles, self._start, self._stop)
@@ -84,7 +90,7 @@ class DipoleTree:
         def run(rows: slice) -> None:
             _dipole_sums(
                 rows.start, rows.stop, self.points, dipoles, eps, self._start, self._stop, self._child, self._centre,
-                self._radius, moments, OPENING, out,
+                self._radius, moments, opening, out,
             )  # fmt: skip
 
         in_threads(run, len(self.points))

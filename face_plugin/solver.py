@@ -312,7 +312,7 @@ def reconstruct(
     params: Params | None = None,
     *,
     screened: bool = True,
-    depth: int = 8,
+    depth: int | None = 8,
     filter_interior: bool = True,
     backend: Backend | None = None,
     trim: float = 0.0,
@@ -328,8 +328,8 @@ def reconstruct(
         As in `estimate_normals`.
     screened : bool
         Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
-    depth : int
-        Depth of the reconstruction's octree, 1 to 16.
+    depth : int or None
+        Depth of the reconstruction's octree, 1 to 16; None: from the spacing of the points, at most 12.
     filter_interior : bool
         Leave out the points inside the object.
     backend : {"open3d", "pymeshlab"}, optional

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import MissingDependencyError, require
+from face_plugin.surface_size import suggested_depth, warn_if_too_large
 
 __all__ = ["Backend", "check_arguments", "poisson_reconstruction"]
 
@@ -30,7 +31,7 @@ def poisson_reconstruction(
     points: NDArray[np.floating],
     normals: NDArray[np.floating],
     *,
-    depth: int = 8,
+    depth: int | None = 8,
     screened: bool = True,
     backend: Backend | None = None,
     trim: float = 0.0,
@@ -41,8 +42,9 @@ def poisson_reconstruction(
     ----------
     points, normals : (n, 3) float
         Points in any unit, and outward unit normals.
-    depth : int, 1 to 16
-        Depth of the octree: the finest cell is 1.1 x the longest side / 2**depth (Open3D).
+    depth : int, 1 to 16, or None
+        Depth of the octree: the finest cell is 1.1 x the longest side / 2**depth (Open3D). None: from the
+        spacing of the points, at most 12. A warning says when it will not fit into memory.
     screened : bool
     backend : {"open3d", "pymeshlab"}, optional
         By default whichever is installed, Open3D first.
@@ -82,6 +84,9 @@ def poisson_reconstruction(
     origin = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
     size = float(np.ptp(points, axis=0).max())
     local = (points.astype(np.float64) - origin) / size
+    if depth is None:
+        depth = suggested_depth(local)
+    warn_if_too_large(local, depth)
     run = _open3d if backend == "open3d" else _pymeshlab
     vertices, faces, densities = run(local, normals.astype(np.float64), int(depth), SCREENING * screened)
     if trim > 0 and densities is not None:
@@ -89,7 +94,7 @@ def poisson_reconstruction(
     return vertices * size + origin, faces, densities
 
 
-def check_arguments(depth: int, backend: Backend | None, trim: float) -> Backend:
+def check_arguments(depth: int | None, backend: Backend | None, trim: float) -> Backend:
     """Check the arguments of `poisson_reconstruction`, which come late; return the backend that will run.
 
     Examples
@@ -98,7 +103,7 @@ def check_arguments(depth: int, backend: Backend | None, trim: float) -> Backend
     'open3d'
     """
     whole = isinstance(depth, (int, np.integer)) and not isinstance(depth, bool)
-    if not whole or not DEPTHS[0] <= depth <= DEPTHS[1]:
+    if depth is not None and (not whole or not DEPTHS[0] <= depth <= DEPTHS[1]):
         raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
     if not 0.0 <= trim < 1.0:
         raise ValueError(f"trim must be in [0, 1), found {trim!r}")

@@ -165,9 +165,14 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
     from face_plugin.surface import BACKENDS, DEPTHS
 
     group = parser.add_argument_group("surface")
-    depths = range(DEPTHS[0], DEPTHS[1] + 1)
+    depths = (None, *range(DEPTHS[0], DEPTHS[1] + 1))
     group.add_argument(
-        "--depth", type=int, choices=depths, default=8, metavar="N", help="depth of the octree [default: 8]"
+        "--depth",
+        type=_depth,
+        choices=depths,
+        default=8,
+        metavar="N|auto",
+        help="depth of the octree; auto = from the spacing of the points [default: 8]",
     )
     group.add_argument(
         "--unscreened",
@@ -184,6 +189,13 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
         metavar="F",
         help="drop this fraction of the vertices, the least dense",
     )
+
+
+def _depth(text: str) -> int | None:
+    return None if text == "auto" else int(text)
+
+
+_depth.__name__ = "number or auto"
 
 
 def surface_of(args: argparse.Namespace) -> dict[str, Any]:

@@ -1,0 +1,85 @@
+"""Which points lie inside the object: against the truth of generated solids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from face_plugin import FaCE, Params, shapes
+from face_plugin.cage import local_spacing
+from face_plugin.interior import automatic_alpha, enclosure
+
+SOLIDS = {
+    "box in a sphere": lambda: shapes.nested_box(4000, 0),
+    "crossed cylinders": lambda: shapes.crossed_cylinders(4000, 0),
+    "shelves in a box": lambda: shapes.shelves(6000, 0),
+    "two spheres": lambda: shapes.two_spheres(4000, 0),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_points_deeper_than_two_spacings_are_found_and_no_others(name):
+    shape = SOLIDS[name]()
+    found = FaCE(shape.points).interior()
+    spacing = np.median(local_spacing(shape.points))
+    deep = shape.interior & (shape.depth > 2 * spacing)
+    surface = ~shape.interior
+    recall = found[deep].mean()
+    precision = (found & deep).sum() / (found & (deep | surface)).sum()
+    assert recall >= 0.99
+    assert precision >= 0.99
+
+
+def test_a_doubled_shell_loses_no_point_of_its_outer_layer():
+    shell = shapes.doubled_shell(4000, 0)
+    found = FaCE(shell.points).interior()
+    assert found[~shell.interior].mean() < 0.01
+
+
+@pytest.mark.parametrize("make", [shapes.sphere, shapes.torus, shapes.bowl, shapes.box])
+def test_nothing_is_dropped_where_nothing_is_inside(make):
+    # At most one point in a thousand.
+    assert FaCE(make(3000, 0).points).interior().mean() <= 0.001
+
+
+def test_a_fixed_alpha_is_the_papers_rule_and_solves_nothing_again():
+    cup = shapes.cup(2500, 0, depth=1.5, thickness=0.3)
+    face = FaCE(cup.points)
+    solved = face.timings["poisson"]
+    shielded = face.interior("sparse").mean()
+    # A shielded dent counts as inside for the paper, and not for "auto".
+    assert shielded > 0.02
+    assert face.interior("auto").mean() < 0.25 * shielded
+    assert face.interior(0.05).mean() == shielded
+    assert face.timings["poisson"] == solved
+
+
+def test_both_inside_tests_say_the_same():
+    points = shapes.demo_shape(2500, 0).points
+    rays = FaCE(points, Params(alpha=0.01)).interior()
+    winding = FaCE(points, Params(alpha=0.01, inside="winding")).interior()
+    assert (rays == winding).mean() >= 0.9995
+
+
+def test_alpha_follows_the_leak_within_bounds():
+    assert automatic_alpha(np.ones(3), np.full(3, 0.5)) == 0.05
+    assert automatic_alpha(np.full(3, 0.2), np.ones(3)) == pytest.approx(0.2)
+    assert automatic_alpha(np.full(3, 0.9), np.ones(3)) == 0.3
+
+
+def test_the_resolved_alpha_stands_in_the_result():
+    result = FaCE(shapes.nested_box(1500, 0).points).result(filter_interior=True)
+    assert isinstance(result.params.alpha, float)
+
+
+def test_enclosure_leaves_out_what_lies_inside():
+    nested = shapes.nested_box(3000, 0)
+    w = enclosure(nested.points, nested.normals, np.where(nested.interior, 0.0, 1.0))
+    # A point's area is taken as its squared spacing, which is a fifth too much on even samplings.
+    assert np.median(w[nested.interior]) == pytest.approx(1.2, abs=0.1)
+    assert np.median(w[~nested.interior]) == pytest.approx(0.5, abs=0.1)
+
+
+def test_an_unknown_name_is_refused():
+    with pytest.raises(ValueError, match="alpha"):
+        FaCE(shapes.sphere(200, 0).points).interior("thick")

@@ -1,0 +1,64 @@
+"""The winding-number field of oriented points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from face_plugin import shapes
+from face_plugin.normals import unit
+from face_plugin.winding import DipoleTree
+
+
+def exact(points, normals, areas, eps):
+    """Sum over all pairs: -4 pi grad w (n, 3) and w (n,) by the formulas of the module's description."""
+    d = points[None] - points[:, None]
+    r2 = (d**2).sum(axis=2) + eps[:, None] ** 2
+    m = areas[:, None] * normals
+    along = np.einsum("ijk,jk->ij", d, m)
+    np.fill_diagonal(r2, np.inf)
+    gradient = (m[None] / r2[..., None] ** 1.5 - 3 * along[..., None] * d / r2[..., None] ** 2.5).sum(axis=1)
+    return gradient, (along / r2**1.5).sum(axis=1) / (4 * np.pi)
+
+
+@pytest.fixture(scope="module")
+def cloud():
+    shape = shapes.torus(700, 0)
+    rng = np.random.default_rng(0)
+    areas, eps = rng.uniform(0.5, 1.5, 700) * 1e-3, rng.uniform(0.02, 0.2, 700)
+    return shape.points, shape.normals, areas, eps
+
+
+def test_opening_zero_is_the_exact_sum(cloud):
+    points, normals, areas, eps = cloud
+    tree = DipoleTree(points, areas)
+    expected, _ = exact(points, normals, areas, eps)
+    np.testing.assert_allclose(tree.outward(normals, eps, 0.0), expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_the_tree_is_near_the_exact_sum(cloud):
+    points, normals, areas, eps = cloud
+    tree = DipoleTree(points, areas)
+    expected, number = exact(points, normals, areas, eps)
+    cosine = (unit(tree.outward(normals, eps)) * unit(expected)).sum(axis=1)
+    # Measured: mean 0.3 degrees in Morton order; these points are in random order, whose groups are wide and opened.
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 1
+    np.testing.assert_allclose(tree.number(normals, eps), number, atol=0.02)
+
+
+def test_the_order_of_points_does_not_matter_when_exact(cloud):
+    points, normals, areas, eps = cloud
+    turn = np.random.default_rng(1).permutation(len(points))
+    one = DipoleTree(points, areas).outward(normals, eps, 0.0)
+    other = DipoleTree(points[turn], areas[turn]).outward(normals[turn], eps[turn], 0.0)
+    np.testing.assert_allclose(other, one[turn], rtol=1e-9, atol=1e-9 * np.abs(one).max())
+
+
+def test_number_is_a_half_on_the_surface_and_one_inside():
+    ball = shapes.sphere(4000, 0)
+    points = np.concatenate([ball.points, 0.5 * ball.points[:50]])
+    normals = np.concatenate([ball.normals, np.zeros((50, 3))])
+    areas = np.full(len(points), 4 * np.pi / 4000)
+    w = DipoleTree(points, areas).number(normals, np.full(len(points), 0.03))
+    assert np.median(w[:4000]) == pytest.approx(0.5, abs=0.03)
+    np.testing.assert_allclose(w[4000:], 1, atol=0.02)

@@ -26,8 +26,8 @@ __all__ = ["automatic_alpha", "enclosure", "is_interior", "shielded"]
 # Winding number above which a point is enclosed by the others: the paper's threshold. The surface itself has 1/2, its
 # concave edges 3/4.
 ENCLOSED = 0.9
-# Width of the kernel of the winding number, in spacings: a second layer within the noise is not an interior.
-WIDTH = 0.75
+# Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
+WIDTH = 0.5
 # What is enclosed shows how far the field leaks in: alpha is this percentile of its strength, within the bounds.
 LEAK_PERCENTILE = 90.0
 ALPHA_BOUNDS = (ALPHAS["sparse"], 0.3)

@@ -47,7 +47,7 @@ QUADRICS = (12, 18, 30, 48)
 RESIDUAL_GROWTH = 1.35
 # The quadric takes over from the narrow kernel between these residuals (in spacings) and as the residual's growth over
 # the first two sizes falls between these: at the left the surface is resolved, at the right points scatter about it.
-SCATTER = (0.10, 0.25)
+SCATTER = (0.11, 0.27)
 GROWTH = (1.4, 1.1)
 # Residuals are compared by this percentile over the neighbourhood: scatter sits where sheets overlap, not everywhere.
 RESIDUAL_PERCENTILE = 75.0

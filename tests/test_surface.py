@@ -159,3 +159,17 @@ def test_reconstruct_checks_its_arguments_before_it_solves():
         reconstruct(np.zeros((0, 3)), depth=99)
     with pytest.raises(ValueError, match="backend must be one of"):
         reconstruct(np.zeros((0, 3)), backend="cgal")
+
+
+def test_two_implementations_give_the_same_picture():
+    shape = shapes.teapot(3000, 0)
+    surfaces = [reconstruct(shape.points, depth=6, backend=backend) for backend in INSTALLED]
+    one, other = (s.vertices for s in surfaces)
+    size = np.linalg.norm(np.ptp(shape.points, axis=0))
+    there, back = cKDTree(one).query(other)[0] / size, cKDTree(other).query(one)[0] / size
+    # Distances between vertices, in diagonals. Measured for two seeds: 0.0006 in the mean, 0.014 at most, where the
+    # teapot's parts meet.
+    assert max(there.mean(), back.mean()) < 0.0015
+    assert max(there.max(), back.max()) < 0.03
+    assert surfaces[0].result.interior is not None
+    np.testing.assert_array_equal(surfaces[0].result.interior, surfaces[1].result.interior)

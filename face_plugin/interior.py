@@ -28,6 +28,10 @@ __all__ = ["automatic_alpha", "enclosure", "is_interior", "shielded"]
 ENCLOSED = 0.9
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
 WIDTH = 0.5
+# Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which rises
+# as the numbers get clearer. No dent that is open to the outside is as dark.
+DARK = 1e-4
+PASSES = (0.6, 0.7, 0.8)
 # What is enclosed shows how far the field leaks in: alpha is this percentile of its strength, within the bounds.
 LEAK_PERCENTILE = 90.0
 ALPHA_BOUNDS = (ALPHAS["sparse"], 0.3)
@@ -38,8 +42,8 @@ def enclosure(
 ) -> NDArray[np.float64]:
     """Winding number (n,) of the surface's points at every point: 1 inside, about 1/2 on the surface.
 
-    What lies inside has no outward side and would blur the number, so it is computed twice: the second time without
-    the points that are shielded and were enclosed the first time.
+    What lies inside has no outward side and would blur the number. So it is computed again and again, each time without
+    the points in the dark that were enclosed the time before.
 
     Parameters
     ----------
@@ -59,9 +63,11 @@ def enclosure(
     spacing = distance[:, 1:].mean(axis=1)
     tree = DipoleTree(points, spacing**2)
     width = WIDTH * spacing
-    first = tree.number(normals, width)
-    inner = (strength < ALPHAS["dense"]) & (first > ENCLOSED)
-    return tree.number(np.where(inner[:, None], 0.0, normals), width)
+    number = tree.number(normals, width)
+    for enclosed in PASSES:
+        inner = (strength < DARK) & (number > enclosed)
+        number = tree.number(np.where(inner[:, None], 0.0, normals), width)
+    return number
 
 
 def automatic_alpha(strength: NDArray[np.float64], enclosed: NDArray[np.float64]) -> float:

@@ -28,8 +28,8 @@ __all__ = ["automatic_alpha", "enclosure", "is_interior", "shielded"]
 ENCLOSED = 0.9
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
 WIDTH = 0.5
-# Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which rises
-# as the numbers get clearer. No dent that is open to the outside is as dark.
+# Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which
+# rises as the numbers get clearer. No dent that is open to the outside is as dark.
 DARK = 1e-4
 PASSES = (0.6, 0.7, 0.8)
 # What is enclosed shows how far the field leaks in: alpha is this percentile of its strength, within the bounds.

@@ -59,7 +59,8 @@ def check_balls(
     side = box.upper - box.lower
     if not (np.isfinite(side).all() and side.min() > BOX_SIDES[0] and side.max() < BOX_SIDES[1]):
         raise MeshingError(
-            f"the box must have sides within {BOX_SIDES}, found {side}; try Params.padding=0.1 and Params.least_side=0.25"
+            f"the box must have sides within {BOX_SIDES}, found {side}; "
+            "try Params.padding=0.1 and Params.least_side=0.25"
         )
     if not (np.isfinite(balls.vertices).all() and np.isfinite(spacing).all() and spacing.min() > 0):
         raise MeshingError("balls and spacings must be finite, and spacings positive")

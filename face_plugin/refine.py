@@ -70,7 +70,7 @@ def refine(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray
     points : (n, 3) float64
         Distinct; in Morton order for speed.
     normals : (n, 3) float64
-        Rough outward unit normals, most of them on the right side.
+        Rough outward unit normals, most of them on the right side; zero where nothing is known.
 
     Returns
     -------

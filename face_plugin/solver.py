@@ -30,6 +30,9 @@ __all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconst
 
 log = logging.getLogger(__name__)
 
+# Where the field is weaker, double precision leaves nothing of its direction.
+ROUNDING = 1e-9
+
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and 0.0 at its start, 1.0 at its end."""
 
@@ -153,9 +156,15 @@ class FaCE(Sculptable):
                 # The field is the same on both sides of a sheet: its mean gradient lies in the sheet.
                 return np.tile(self.cloud.plane_normal(), (len(self.cloud.points), 1))
             # 7. The strength grows outward, so its gradient at a ball points outward.
-            rough = self._field_normals
+            if self.params.angles == "field":
+                return self._field_normals
             # 8. Stray sides turned round, and angles, from the points themselves.
-            return refine(self.cloud.points, rough) if self.params.angles == "refined" else rough
+            return refine(self.cloud.points, self._votes)
+
+    @cached_property
+    def _votes(self) -> NDArray[np.float64]:
+        """Field normals (m, 3), zero where there is no field: its gradient there is rounding, and must not spread."""
+        return np.where((self._point_strength > ROUNDING)[:, None], self._field_normals, 0.0)
 
     @cached_property
     def _enclosure(self) -> NDArray[np.float64]:
@@ -228,7 +237,7 @@ class FaCE(Sculptable):
         return Result(
             normals=oriented,
             strength=self._point_strength[rows].astype(dtype),
-            confidence=confidence(self.cloud.points, self._field_normals, self._normals)[rows].astype(dtype),
+            confidence=confidence(self.cloud.points, self._votes, self._normals)[rows].astype(dtype),
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=params,

@@ -62,7 +62,9 @@ OVERRULE = 0.02
 NEAREST = 0.6
 
 
-def refine(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def refine(
+    points: NDArray[np.float64], normals: NDArray[np.float64], moving: NDArray[np.bool_] | None = None
+) -> NDArray[np.float64]:
     """Refine rough outward normals by the points themselves.
 
     Parameters
@@ -71,6 +73,8 @@ def refine(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray
         Distinct; in Morton order for speed.
     normals : (n, 3) float64
         Rough outward unit normals, most of them on the right side; zero where nothing is known.
+    moving : (n,) bool, optional
+        Which normals to refine; the others take part as they are. By default all.
 
     Returns
     -------
@@ -93,23 +97,29 @@ def refine(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray
     reach = next_sheet(points, distance, neighbour, spacing)
     width = np.clip(SIDE_WIDTH * reach, SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing)
     plate = back_to_back(points, normals, neighbour, spacing)
+    still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
+    kept = plate | still
+    width[kept] = 0.0
     rough = normals
     for _ in range(SIDE_STEPS):
-        normals = np.where(plate[:, None], rough, unit(tree.outward(normals, width, SIDE_OPENING)))
+        normals = np.where(kept[:, None], rough, unit(tree.outward(normals, width, SIDE_OPENING)))
     side = normals
 
-    fitted, scatter = choose_quadric(points, normals, neighbour, spacing)
+    # Where nothing is known and nothing moved, any direction will do for the fit.
+    fitted, scatter = choose_quadric(points, unit(normals), neighbour, spacing)
     scatter[plate] = 1.0
     width = np.sqrt(np.maximum((NEAREST * spacing) ** 2 - distance[:, 1] ** 2, (ANGLE_WIDTH * spacing) ** 2))
     plane = plane_fit(points, distance, neighbour, min(PLANE[0], count - 1), PLANE[1])
     resolved = (1.0 - scatter)[:, None]
     fitted = scatter[:, None] * _along(fitted, normals)
+    width[still] = 0.0
     for _ in range(ANGLE_STEPS):
         narrow = unit(tree.outward(normals, width))
-        normals = unit(resolved * narrow + fitted)
+        normals = np.where(still[:, None], rough, unit(resolved * narrow + fitted))
     normals = unit(normals + PLANE_WEIGHT * resolved * _along(plane, normals))
     settled = scatter[neighbour].mean(axis=1) > OVERRULE
-    return np.where(settled[:, None], _along(normals, side), normals)
+    normals = np.where(settled[:, None], _along(normals, side), normals)
+    return np.where(still[:, None], rough, normals)
 
 
 def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:

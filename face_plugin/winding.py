@@ -61,7 +61,7 @@ class DipoleTree:
         ----------
         normals : (n, 3) float64
         eps : (n,) float64
-            Width of the kernel at each point, > 0.
+            Width of the kernel at each point; 0 where no value is wanted: the result is 0 there.
         opening : float, in [0, 1)
             Groups of points act as one where their radius is below this fraction of their distance; 0 is exact.
 
@@ -155,6 +155,9 @@ def _dipole_sums(  # type: ignore[no-untyped-def]
     """
     stack = np.empty(STACK, np.int64)
     for i in range(first, last):
+        if eps[i] == 0.0:
+            out[i] = 0.0
+            continue
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         squared = eps[i] * eps[i]
         gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0

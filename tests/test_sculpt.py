@@ -122,11 +122,12 @@ def test_shielded_vertices_need_no_pin(solved):
     np.testing.assert_allclose(pinned.solve(solved.potential(), joined=outer), whole, rtol=0, atol=1e-9)
 
 
-def test_a_cavity_filled_with_conductor_has_no_rim(shell):
-    face = shell[1]
+def test_a_cavity_filled_with_conductor_has_no_rim():
+    # So dense that no tetrahedron reaches from the cavity into the wall, which 1,200 points do not ensure.
+    face = FaCE(shapes.spherical_shell(1500).points)
     centre = face.frame.to_unit(np.zeros((1, 3)))
     free = face.poisson.free
-    inside = free[np.linalg.norm(face.mesh.vertices[free] - centre, axis=1) * face.frame.scale < 0.6]
+    inside = free[np.linalg.norm(face.mesh.vertices[free] - centre, axis=1) * face.frame.scale < 0.52]
     assert len(inside) > 50
     assert len(rim(face.mesh, inside)) == 0
     found = PinnedPoisson(face.poisson).solve(face.potential(), joined=inside)

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from face_plugin import interior
 from face_plugin.confidence import confidence
 from face_plugin.refine import refine
 from face_plugin.solver import ROUNDING
 from face_plugin.tiles.scene import scene
-from face_plugin.tiles.solve import one_at_a_time
+from face_plugin.tiles.solve import one_thread
 from face_plugin.tiles.store import Store
 
 __all__ = ["POLISH_STAGES", "polish_tile"]
@@ -38,7 +37,7 @@ def polish_tile(folder: str, tile: int) -> int:
     """
     store = Store.load(Path(folder))
     if not store.done(tile, "normals"):
-        with one_at_a_time, threadpool_limits(1):
+        with one_thread():
             store.write(tile, "normals", **_polish(store, tile))
     return tile
 

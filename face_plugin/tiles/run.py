@@ -18,12 +18,12 @@ from face_plugin import cloud, interior
 from face_plugin.params import ALPHAS, Params
 from face_plugin.solver import Progress, Result
 from face_plugin.tiles.choose import EngineLike, make_engine, tile_size
-from face_plugin.tiles.coarse import solve_coarse
+from face_plugin.tiles.coarse import Voxels, solve_coarse
 from face_plugin.tiles.engines import Engine, Job
 from face_plugin.tiles.polish import POLISH_STAGES, polish_tile
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.scene import write_far
-from face_plugin.tiles.solve import TILE_STAGES, solve_tile
+from face_plugin.tiles.solve import TILE_STAGES, one_thread, solve_tile
 from face_plugin.tiles.sources import CHUNK, ArraySource, Source
 from face_plugin.tiles.store import Store
 
@@ -154,13 +154,18 @@ def solve_store(
                 fill_store, folder, source, params, points, interior=classify, key=key, chunk=chunk
             )
             store, voxels = timed("cloud", fill)
-            timed("coarse", lambda: solve_coarse(voxels, params).save(folder))
+            timed("coarse", lambda: _solve_coarse(voxels, params, folder))
             store.save()
         solved: Store = store
         timed("tiles", lambda: _run(running, solve_tile, solved, "field", "tiles", report))
         write_far(solved)
         timed("normals", lambda: _run(running, polish_tile, solved, "normals", "normals", report))
     return store, timings
+
+
+def _solve_coarse(voxels: Voxels, params: Params, folder: Path) -> None:
+    with one_thread():
+        solve_coarse(voxels, params).save(folder)
 
 
 def _found(folder: Path, key: str) -> Store | None:

@@ -105,8 +105,8 @@ def scene(store: Store, tile: int) -> Scene:
     place[order] = np.cumsum(leads) - 1
     kept = order[leads]
     moving = NEAR * near.spacing - reach
-    inner = ((points[kept] >= near.lower - moving) & (points[kept] <= near.upper + moving)).all(axis=1)
-    return Scene(points[kept], unit(normals[kept]), strength[kept], place[near.own], inner)
+    inside = (points[kept] >= near.lower - moving) & (points[kept] <= near.upper + moving)
+    return Scene(points[kept], unit(normals[kept]), strength[kept], place[near.own], np.asarray(inside.all(axis=1)))
 
 
 def _thinned(points: NDArray[np.float64], distance: NDArray[np.float64], reach: float) -> NDArray[np.intp]:

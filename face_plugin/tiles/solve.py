@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from face_plugin import cage, field, normals
 from face_plugin.domain import Box
+from face_plugin.errors import MissingDependencyError, require
 from face_plugin.locate import Locator
 from face_plugin.params import Params
 from face_plugin.tiles.coarse import Coarse
@@ -22,7 +25,7 @@ from face_plugin.tiles.level import solve_level
 from face_plugin.tiles.store import Store
 from face_plugin.tiles.surroundings import Surroundings, surroundings
 
-__all__ = ["HALO", "TILE_STAGES", "one_at_a_time", "solve_tile"]
+__all__ = ["HALO", "TILE_STAGES", "one_thread", "solve_tile"]
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +39,22 @@ CELLS = (4, 5, 6, 7)
 TILE_STAGES = ("cage", "mesh", "poisson", "field", "normals")
 
 # A tile takes a core and its share of the memory; gmsh is one per process anyway.
-one_at_a_time = threading.Lock()
+_one_at_a_time = threading.Lock()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Run what follows alone in this process, and its libraries on one thread: sums then have one order."""
+    _load_solver()
+    with _one_at_a_time, threadpool_limits(1):
+        yield
+
+
+@lru_cache(maxsize=1)
+def _load_solver() -> None:
+    """Load the solver's BLAS: only what is loaded can be told how many threads to use."""
+    with suppress(MissingDependencyError):
+        require("sksparse.cholmod", extra="cholmod")
 
 
 @lru_cache(maxsize=1)
@@ -68,7 +86,7 @@ def solve_tile(folder: str, tile: int) -> int:
     """
     store = Store.load(Path(folder))
     if not store.done(tile, "field"):
-        with one_at_a_time, threadpool_limits(1):
+        with one_thread():
             store.write(tile, "field", **_solve(store, tile))
     return tile
 

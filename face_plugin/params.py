@@ -60,7 +60,7 @@ class Params:
     0 = the paper's padding, which vanishes around a flat object."""
     mesher: Literal["auto", "delaunay", "tetgen", "tetwild"] = "auto"
     """Mesher: plain Delaunay, the paper's TetGen, fTetWild; "auto" is "delaunay", and others where it fails."""
-    grading: float = 0.8
+    grading: float = 1.2
     """Size of the tetrahedra far from the points, as a fraction of the distance to the nearest; (0, 2]."""
     finest: float = 1.5
     """Size of the smallest cells of free vertices, in local spacings; (0, 10]."""

@@ -4,7 +4,8 @@ E_max knows the side of nearly every point, but its gradient is accurate to ten 
 
 1. **Side.** A few steps of n <- -grad w / |grad w|, the winding-number field of the oriented points, turn the stray
    points round. The kernel is as wide as the distance to the next sheet of the surface allows, so it bridges gaps
-   and noise and does not reach across thin walls.
+   and noise and does not reach across thin walls. Where there is no sheet, as in a bar thinner than the spacing, a
+   strong field keeps a vote.
 2. **Angle.** Quadrics are fitted to more and more neighbours as long as the residual does not grow with them: it does
    where the surface is resolved (then the smallest fit is already too large, and narrow winding-number steps take
    over), and does not where points scatter about it.
@@ -12,12 +13,15 @@ E_max knows the side of nearly every point, but its gradient is accurate to ten 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from face_plugin.fits import plane_fit, quadric_fits
 from face_plugin.normals import unit
+from face_plugin.sheets import back_to_back, bulk, far_sheet, next_sheet
 from face_plugin.winding import DipoleTree
 
 __all__ = ["refine"]
@@ -30,18 +34,15 @@ SIDE_STEPS = 14
 SIDE_OPENING = 0.6
 SIDE_WIDTH = 0.3
 SIDE_BOUNDS = (0.3, 3.0)
-# A neighbour farther than this many spacings, within 37 degrees of the normal, belongs to another sheet.
-SHEET_DISTANCE = 1.2
-SHEET_COSINE = 0.8
-# A plate thinner than this many spacings: of PLATE_NEIGHBOURS at least PLATE_SHARE faces the other way, PLATE_BEHIND of
-# those lies behind the point, PLATE_PARALLEL of all is parallel to within 45 degrees, for most points around.
-PLATE_THICKNESS = 1.0
-PLATE_NEIGHBOURS = 24
-PLATE_SHARE = 0.25
-PLATE_BEHIND = 0.9
-PLATE_PARALLEL = 0.85
-PLATE_MAJORITY = 0.4
-SAME_LINE = 0.7
+# On a sheet the kernel may reach farther, to strokes many spacings away: at first up to this many spacings, then less
+# and less, down to the bound above. A sheet is where `bulk` is below these values, fully and not at all.
+WIDEST = 6.0
+SHEET = (0.03, 0.1)
+# The field keeps a vote, next to the unit jump of the winding number, where points form no sheet (`bulk` from, to) and
+# stand out into the field (E_max from, to): bars thinner than the spacing, which look like noise but for their field.
+VOTE = 0.5
+NO_SHEET = (0.1, 0.4)
+STANDING_OUT = (0.2, 2.0)
 # Angle: neighbours of the quadrics; a larger one is taken while its residual is below this multiple of the smallest's.
 QUADRICS = (12, 18, 30, 48)
 RESIDUAL_GROWTH = 1.35
@@ -63,7 +64,10 @@ NEAREST = 0.6
 
 
 def refine(
-    points: NDArray[np.float64], normals: NDArray[np.float64], moving: NDArray[np.bool_] | None = None
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    strength: NDArray[np.float64],
+    moving: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Refine rough outward normals by the points themselves.
 
@@ -73,6 +77,8 @@ def refine(
         Distinct; in Morton order for speed.
     normals : (n, 3) float64
         Rough outward unit normals, most of them on the right side; zero where nothing is known.
+    strength : (n,) float64
+        E_max at the points.
     moving : (n,) bool, optional
         Which normals to refine; the others take part as they are. By default all.
 
@@ -86,24 +92,18 @@ def refine(
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(500)
     >>> rough = unit(ball.normals + 0.3 * np.random.default_rng(0).normal(size=(500, 3)))
-    >>> bool(((refine(ball.points, rough) * ball.normals).sum(axis=1) > 0.99).all())
+    >>> bool(((refine(ball.points, rough, np.ones(500)) * ball.normals).sum(axis=1) > 0.99).all())
     True
     """
     count = min(NEIGHBOURS + 1, len(points))
     distance, neighbour = cKDTree(points).query(points, k=count, workers=-1)
     spacing = distance[:, 1:7].mean(axis=1)
     tree = DipoleTree(points, spacing**2)
-
-    reach = next_sheet(points, distance, neighbour, spacing)
-    width = np.clip(SIDE_WIDTH * reach, SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing)
     plate = back_to_back(points, normals, neighbour, spacing)
     still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
-    kept = plate | still
-    width[kept] = 0.0
     rough = normals
-    for _ in range(SIDE_STEPS):
-        normals = np.where(kept[:, None], rough, unit(tree.outward(normals, width, SIDE_OPENING)))
-    side = normals
+
+    normals = side = _sides(tree, normals, strength, distance, neighbour, spacing, plate | still)
 
     # Where nothing is known and nothing moved, any direction will do for the fit.
     fitted, scatter = choose_quadric(points, unit(normals), neighbour, spacing)
@@ -122,57 +122,41 @@ def refine(
     return np.where(still[:, None], rough, normals)
 
 
-def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lines (n, 3) turned to the side of the normals."""
-    return np.asarray(lines * np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)[:, None])
-
-
-def next_sheet(
-    points: NDArray[np.float64],
+def _sides(
+    tree: DipoleTree,
+    rough: NDArray[np.float64],
+    strength: NDArray[np.float64],
     distance: NDArray[np.float64],
     neighbour: NDArray[np.intp],
     spacing: NDArray[np.float64],
+    kept: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """Distance (n,) from each point to the nearest other sheet of the surface, at most to its last neighbour.
+    """Turn stray normals (n, 3) round; those `kept` stay as they are."""
+    points = tree.points
+    shape = bulk(points, neighbour)
+    sheet = 1.0 - _ramp(shape, SHEET)
+    near = next_sheet(points, distance, neighbour, spacing)
+    # What was found among the neighbours is nearer than anything that lies beyond them.
+    far = np.where(near < distance[:, -1], near, np.maximum(near, far_sheet(points, spacing, NEIGHBOURS)))
+    low, high = SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing
+    narrow = np.clip(SIDE_WIDTH * near, low, high)
+    wide = np.maximum(SIDE_WIDTH * far, low)
+    vote = VOTE * _ramp(shape, NO_SHEET) * _ramp(np.log(np.maximum(strength, 1e-9)), np.log(STANDING_OUT))
+    vote = vote[:, None] * rough
+    normals = rough
+    for step in range(SIDE_STEPS):
+        bound = WIDEST * (SIDE_BOUNDS[1] / WIDEST) ** (step / SIDE_STEPS)
+        width = narrow ** (1.0 - sheet) * np.minimum(wide, bound * spacing) ** sheet
+        width[kept] = 0.0
+        # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
+        jump = tree.outward(normals, width, SIDE_OPENING) * (width / (2.0 * np.pi))[:, None]
+        normals = np.where(kept[:, None], rough, unit(jump + vote))
+    return normals
 
-    Needs no orientation: a neighbour along the normal, of either sign, lies on another sheet.
-    """
-    line = plane_fit(points, distance, neighbour, min(12, distance.shape[1] - 1), 1.0)
-    reach = distance[:, -1].copy()
-    for k in range(1, distance.shape[1]):
-        along = np.abs(np.einsum("nd,nd->n", points[neighbour[:, k]] - points, line))
-        hit = (along > SHEET_COSINE * distance[:, k]) & (distance[:, k] > SHEET_DISTANCE * spacing)
-        np.minimum(reach, np.where(hit, distance[:, k], np.inf), out=reach)
-    return reach
 
-
-def back_to_back(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    neighbour: NDArray[np.intp],
-    spacing: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    """Find the points (n,) of plates thinner than the spacing, which only the field can tell from noise.
-
-    In a plate about half of the neighbours face the other way, and nearly all of those lie behind the point, as it
-    lies behind them. Where points scatter about one sheet, few face the other way, and as many in front as behind. A
-    point belongs to a plate where most of its neighbours have this pattern, so that a plate's rim does, too.
-    """
-    near = neighbour[:, 1 : PLATE_NEIGHBOURS + 1]
-    facing = np.einsum("nkd,nd->nk", normals[near], normals)
-    offset = points[near] - points[:, None]
-    depth = -np.einsum("nkd,nd->nk", offset, normals)
-    behind = (depth > 0) & (np.einsum("nkd,nkd->nk", offset, normals[near]) > 0)
-    behind &= depth < PLATE_THICKNESS * spacing[:, None]
-    opposite = facing < -SAME_LINE
-    count = opposite.sum(axis=1)
-    parallel = (np.abs(facing) > SAME_LINE).mean(axis=1)
-    pattern = (
-        (count >= PLATE_SHARE * near.shape[1])
-        & ((opposite & behind).sum(axis=1) >= PLATE_BEHIND * count)
-        & (parallel > PLATE_PARALLEL)
-    )
-    return np.asarray(pattern[near].mean(axis=1) > PLATE_MAJORITY)
+def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lines (n, 3) turned to the side of the normals."""
+    return np.asarray(lines * np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)[:, None])
 
 
 def choose_quadric(
@@ -189,6 +173,8 @@ def choose_quadric(
     if len(counts) < 2:
         return normals, np.zeros(len(points))
     fitted, residual = quadric_fits(points, normals, neighbour, spacing, counts)
+    if not np.isfinite(residual[0]).any():
+        return normals, np.zeros(len(points))
     residual = np.where(np.isfinite(residual), residual, np.nanmedian(residual, axis=1, keepdims=True))
     typical = np.array([np.percentile(r[neighbour], RESIDUAL_PERCENTILE, axis=1) for r in residual])
     smallest = np.maximum(typical[0], 1e-12)
@@ -199,6 +185,6 @@ def choose_quadric(
     return fitted[chosen, np.arange(len(points))], scatter
 
 
-def _ramp(values: NDArray[np.float64], ends: tuple[float, float]) -> NDArray[np.float64]:
+def _ramp(values: NDArray[np.float64], ends: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """0 at the first end, 1 at the second, linear between."""
     return np.asarray(np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0))

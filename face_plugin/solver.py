@@ -159,7 +159,7 @@ class FaCE(Sculptable):
             if self.params.angles == "field":
                 return self._field_normals
             # 8. Stray sides turned round, and angles, from the points themselves.
-            return refine(self.cloud.points, self._votes)
+            return refine(self.cloud.points, self._votes, self._point_strength)
 
     @cached_property
     def _votes(self) -> NDArray[np.float64]:
@@ -167,9 +167,9 @@ class FaCE(Sculptable):
         return np.where((self._point_strength > ROUNDING)[:, None], self._field_normals, 0.0)
 
     @cached_property
-    def _enclosure(self) -> NDArray[np.float64]:
-        """Winding number (m,) of the oriented points at each distinct point."""
-        return interior.enclosure(self.cloud.points, self._normals, self._point_strength)
+    def _enclosed(self) -> NDArray[np.bool_]:
+        """Which distinct points (m,) the others enclose."""
+        return interior.enclosed(self.cloud.points, self._normals, self._point_strength)
 
     def normals(self) -> NDArray[np.floating]:
         """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
@@ -220,11 +220,11 @@ class FaCE(Sculptable):
             )
             return interior.is_interior(inside, enclosed)[self.cloud.rows]
 
-    def _threshold(self, alpha: float | str) -> tuple[float, NDArray[np.float64] | None]:
-        """Alpha as a number and, where it is automatic, the enclosure (m,) that a point inside needs besides."""
+    def _threshold(self, alpha: float | str) -> tuple[float, NDArray[np.bool_] | None]:
+        """Alpha as a number and, where it is automatic, which points (m,) are enclosed, as those inside must be."""
         alpha = Params(alpha=alpha).alpha  # type: ignore[arg-type]
         if alpha == "auto":
-            return interior.automatic_alpha(self._point_strength, self._enclosure), self._enclosure
+            return interior.automatic_alpha(self._point_strength, self._enclosed), self._enclosed
         return (ALPHAS[alpha] if isinstance(alpha, str) else alpha), None
 
     def result(self, *, filter_interior: bool = False) -> Result:

@@ -72,28 +72,49 @@ class DipoleTree:
         """
         return self._evaluate(normals, eps, opening)[:, :3]
 
-    def number(self, normals: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Winding number (n,) at each point, of the dipoles of all the others; arguments as in `outward`.
+    def number(
+        self,
+        normals: NDArray[np.float64],
+        eps: NDArray[np.float64],
+        positions: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Winding number: about 1/2 at a point of the surface, 1 inside it and 0 outside.
 
-        About 1/2 at a point of the surface, 1 inside it and 0 outside.
+        Parameters
+        ----------
+        normals : (n, 3) float64
+        eps : (k,) float64
+            Width of the kernel at each position; 0 where no value is wanted: the result is 0 there.
+        positions : (k, 3) float64, optional
+            By default the points themselves, each without its own dipole.
+
+        Returns
+        -------
+        (k,) float64
         """
-        return self._evaluate(normals, eps, OPENING)[:, 3] / (4.0 * np.pi)
+        return self._evaluate(normals, eps, OPENING, positions)[:, 3] / (4.0 * np.pi)
 
     def _evaluate(
-        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float
+        self,
+        normals: NDArray[np.float64],
+        eps: NDArray[np.float64],
+        opening: float,
+        positions: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
         """Columns of -4 pi grad w, and 4 pi w."""
         dipoles = np.ascontiguousarray(normals * self.areas[:, None])
         moments = _moments(dipoles, self._start, self._stop)
-        out = np.empty((len(self.points), 4))
+        own = positions is None
+        queries = self.points if positions is None else np.ascontiguousarray(positions)
+        out = np.empty((len(queries), 4))
 
         def run(rows: slice) -> None:
             _dipole_sums(
-                rows.start, rows.stop, self.points, dipoles, eps, self._start, self._stop, self._child, self._centre,
-                self._radius, moments, opening, out,
+                rows.start, rows.stop, queries, own, self.points, dipoles, eps, self._start, self._stop, self._child,
+                self._centre, self._radius, moments, opening, out,
             )  # fmt: skip
 
-        in_threads(run, len(self.points))
+        in_threads(run, len(queries))
         return out
 
 
@@ -147,18 +168,18 @@ def _moments(dipoles, start, stop):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _dipole_sums(  # type: ignore[no-untyped-def]
-    first, last, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
+    first, last, queries, own, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
 ):
     """-4 pi grad w = sum_j m_j / r^3 - 3 (m_j . d) d / r^5 and 4 pi w = sum_j m_j . d / r^3.
 
-    With d = p_j - x, r^2 = |d|^2 + eps^2 and m_j = a_j n_j.
+    With d = p_j - x, r^2 = |d|^2 + eps^2 and m_j = a_j n_j; a query that is a point itself skips its own dipole.
     """
     stack = np.empty(STACK, np.int64)
     for i in range(first, last):
         if eps[i] == 0.0:
             out[i] = 0.0
             continue
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
         squared = eps[i] * eps[i]
         gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0
         stack[0] = 0
@@ -182,7 +203,7 @@ def _dipole_sums(  # type: ignore[no-untyped-def]
                 top += 2
             else:
                 for k in range(start[node], stop[node]):
-                    if k == i:
+                    if own and k == i:
                         continue
                     dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
                     r2 = dx * dx + dy * dy + dz * dz + squared

@@ -248,14 +248,13 @@ def interior_alpha(store: Store) -> float:
     alpha = store.params.alpha
     if alpha != "auto":
         return ALPHAS[alpha] if isinstance(alpha, str) else alpha
-    strength, enclosed = [], []
+    strength = []
     for tile in range(store.tiles):
-        around = store.read(tile, "normals", "enclosed")["enclosed"]
         # What is not enclosed does not count, and need not be kept.
-        deep = np.flatnonzero(around > interior.ENCLOSED)
+        deep = store.read(tile, "normals", "enclosed")["enclosed"]
         strength.append(store.read(tile, "field", "strength")["strength"][deep])
-        enclosed.append(around[deep])
-    return interior.automatic_alpha(np.concatenate(strength), np.concatenate(enclosed))
+    found = np.concatenate(strength)
+    return interior.automatic_alpha(found, np.ones(len(found), dtype=np.bool_))
 
 
 def tile_seconds(store: Store) -> dict[str, float]:

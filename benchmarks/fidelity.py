@@ -5,10 +5,11 @@
 
 Every cloud is solved five times: with the package's defaults, with a plain Delaunay mesh around icosahedra at every
 point, with the paper's mesh (`Params.paper()`: TetGen), with the same and the icosahedra turned otherwise, which tells
-how far the paper's mesh agrees with itself, and with fTetWild's. Normals are the plain gradients of the field, and in the
-last column the refined ones, which are the package's default. Prints a table and whether the default agrees with the
-paper's mesh on the clean clouds: median angle below 8 degrees, and the same side at 99.8 % of the points, of both kinds
-of normals. Exit status 1 where it does not. Angles and seconds of processor time by stage are drawn into fidelity.png.
+how far the paper's mesh agrees with itself, and with fTetWild's. Normals are the plain gradients of the field, and in
+the last column the refined ones, which are the package's default. Prints a table and whether the default agrees with
+the paper's mesh on the clean clouds: median angle below 8 degrees, and the same side at 99.8 % of the points, of both
+kinds of normals. Exit status 1 where it does not. Angles and seconds of processor time by stage are drawn into
+fidelity.png.
 """
 
 from __future__ import annotations

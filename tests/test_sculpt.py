@@ -239,6 +239,26 @@ def test_edits_are_taken_back_exactly(shell):
     np.testing.assert_array_equal(face.normals(), normals)
 
 
+def test_edits_are_named_in_several_ways(shell):
+    face = shell[1].sculpted(SculptFile())
+    made = face.add_charges([[0.0, 0.0, z] for z in (0.0, 0.1, 0.2, 0.3)])
+    face.remove_edits(made[0])
+    face.remove_edits(np.array([2]))
+    face.remove_edits(np.int64(3))
+    assert face.edits == (made[3],)
+    with pytest.raises(TypeError, match="str"):
+        face.remove_edits(["4"])
+    assert face.edits == (made[3],)
+
+
+@pytest.mark.parametrize("alpha", [np.nan, 0.0, 2.0])
+def test_a_level_that_is_none_is_refused(shell, alpha):
+    face = shell[1].sculpted(SculptFile())
+    with pytest.raises(ValueError, match="alpha must be"):
+        face.add_charges([[0.0, 0.0, 0.0]], alpha=alpha)
+    assert face.edits == ()
+
+
 def test_every_answer_follows_an_edit(shell):
     face = shell[1].sculpted(SculptFile())
     middle = np.zeros((1, 3))
@@ -323,6 +343,16 @@ def test_a_cage_point_takes_the_nearest_vertex_where_none_is_in_reach(shell):
         (edit,) = face.add_cage_points([position], radius)
         np.testing.assert_allclose(edit.places, nearest)
         assert edit.radius == pytest.approx(radius or 0.9 * cKDTree(shell[0].points).query(position)[0])
+
+
+def test_some_radii_may_be_left_out(shell):
+    face = shell[1].sculpted(SculptFile())
+    places = [[0.0, 0.0, 0.75], [0.0, 0.75, 0.0]]
+    first, second = face.add_cage_points(places, [None, 0.2])
+    (alone,) = shell[1].sculpted(SculptFile()).add_cage_points(places[:1])
+    assert (first.radius, second.radius) == (alone.radius, pytest.approx(0.2))
+    with pytest.raises(ValueError, match=r"cage_points: positions\[1\]"):
+        face.sculpted(SculptFile(cage_points=(CagePoint((0.0, 0.0, 0.0), 0.1), CagePoint((9.0, 0.0, 0.0)))))
 
 
 def test_a_charge_keeps_out_of_the_conductor(shell):

@@ -80,6 +80,7 @@ class Viewer:
         self.message = "look: drag to turn, scroll to zoom"
         self.files = {"sculpt": str(sculpt_file), "mesh": str(mesh_file)}
         self._drawn: dict[str, Any] = {}
+        self._inside: NDArray[np.bool_] = np.zeros(len(session.points), dtype=np.bool_)
         self._surface: tuple[FaCE, float, bool] | None = None
         self._ps: Any = window(headless)
         self._gui: Any = require("polyscope.imgui", extra="viewer")
@@ -132,7 +133,9 @@ class Viewer:
     def draw(self) -> None:
         """Bring the picture up to date; what has not changed is left alone."""
         face, alpha, plane = self.session.face, self.session.alpha, self.session.plane
-        self._update("points", (face, alpha, self.session.automatic), self._draw_points)
+        # An edit is to be seen at once: which points are interior takes longer, and is told one frame later.
+        if not self._update("points", (face,), self._draw_points):
+            self._update("interior", (face, alpha, self.session.automatic), self._draw_interior)
         self._update("proxy", (face, alpha), self._draw_proxy)
         self._update("field", (face, plane), self._draw_field)
         self._update("knife", (plane, self.open), self._place_knife)
@@ -142,11 +145,14 @@ class Viewer:
             self._ps.remove_surface_mesh("surface", error_if_absent=False)
             self._surface = None
 
-    def _update(self, name: str, state: tuple[Any, ...], draw: Callable[[], Any]) -> None:
+    def _update(self, name: str, state: tuple[Any, ...], draw: Callable[[], Any]) -> bool:
+        """Draw if the state is another than at the last time, and tell whether it was."""
         # The states are compared by identity: equal arrays in another cage are another drawing.
         known = self._drawn.get(name, ((), None))[0]
-        if len(known) != len(state) or any(a is not b and a != b for a, b in zip(known, state, strict=True)):
-            self._drawn[name] = state, draw()
+        if len(known) == len(state) and all(a is b or a == b for a, b in zip(known, state, strict=True)):
+            return False
+        self._drawn[name] = state, draw()
+        return True
 
     def _draw_points(self) -> None:
         session = self.session
@@ -162,8 +168,15 @@ class Viewer:
             radius=radius * size / self._scale,
             color=NORMAL,
         )
-        inside = session.interior()
-        cloud.add_color_quantity("interior", np.where(inside[:, None], INSIDE, SIDE), enabled=True)
+        self._colour(self._inside)
+
+    def _draw_interior(self) -> None:
+        self._inside = self.session.interior()
+        self._colour(self._inside)
+
+    def _colour(self, inside: NDArray[np.bool_]) -> None:
+        colours = np.where(inside[:, None], INSIDE, SIDE)
+        self._ps.get_point_cloud("points").add_color_quantity("interior", colours, enabled=True)
 
     def _draw_proxy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         vertices, faces = self.session.proxy()

@@ -369,6 +369,22 @@ def test_a_double_click_is_one_edit(hand):
     assert len(session.face.edits) == 1
 
 
+def test_an_edit_is_seen_before_the_interior_is_known(hand, session, monkeypatch):
+    hand.frames(2)
+    asked = []
+    monkeypatch.setattr(session, "interior", lambda: asked.append(session.face) or np.ones(1500, dtype=bool))
+    session.mode = "carve"
+    session.click([0.0, 0.0, 0.75])
+    hand.frames(1)
+    assert asked == []
+    assert polyscope.has_point_cloud("charges")
+    hand.frames(3)
+    assert asked == [session.face]
+    session.alpha = 0.02
+    hand.frames(1)
+    assert len(asked) == 2
+
+
 def test_shielding_on_the_field(hand, tmp_path):
     session = hand.viewer.session
     look((1.5, -1.5, 4.5), (0.0, 0.0, 1.468))

@@ -15,6 +15,8 @@ from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, FaceError, Params, estimate_normals, pins, reconstruct, shapes
 from face_plugin.cloud import Cloud
+from face_plugin.field import strength, vertex_gradients
+from face_plugin.normals import carry, field_normals
 from face_plugin.pins import PinnedPoisson, rim
 from face_plugin.poisson import Poisson
 from face_plugin.sculpt import SculptFile
@@ -111,6 +113,25 @@ def test_pins_equal_a_new_factorisation(reach):
     still = np.zeros((len(mesh.vertices), 1))
     found = PinnedPoisson(face.poisson).solve(still, joined=joined, held=held, value=3.0)
     np.testing.assert_allclose(found, again.solve(values), rtol=0, atol=1e-9)
+
+
+def test_normals_after_edits_equal_those_from_scratch(shell):
+    face = shell[1].with_angles("field")
+    (cage,) = face.add_cage_points([[0.0, 0.75, 0.0]], 0.2)
+    (charge,) = face.add_charges([[0.0, 0.0, 0.1]])
+    mesh = face.mesh
+    owner, boundary = mesh.owner.copy(), mesh.boundary.copy()
+    owner[cage.vertices], boundary[charge.vertices] = owner.max(), True
+    external = Poisson(dataclasses.replace(mesh, owner=owner)).solve(mesh.vertices[mesh.boundary])
+    charged = dataclasses.replace(mesh, owner=owner, boundary=boundary)
+    reach = np.linalg.norm(mesh.vertices[mesh.boundary], axis=1).max()
+    values = np.where(np.isin(np.flatnonzero(boundary), charge.vertices), 5 * reach, 0.0)
+    gradient = vertex_gradients(mesh, Poisson(charged).solve(values[:, None]))[:, :, 0]
+    wanted = np.maximum(strength(mesh, external, "exact"), np.linalg.norm(gradient, axis=1))
+    np.testing.assert_allclose(face.vertex_strength, wanted, rtol=0, atol=1e-8)
+    normals = carry(face.balls.centres, field_normals(mesh, wanted), face.cloud.points)
+    # Nothing is dark here; where the field is near rounding, so is what it says of directions.
+    np.testing.assert_allclose(face.normals(), face.frame.unrotate(normals)[face.cloud.rows], rtol=0, atol=1e-8)
 
 
 def test_shielded_vertices_need_no_pin(solved):

@@ -14,6 +14,7 @@ from face_plugin.adapters._meshlab_params import Parameter, common_parameters, p
 from face_plugin.adapters._meshlab_script import Element, kept_script
 from face_plugin.errors import MeshingError, require
 from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
+from face_plugin.filters.sculpt import sculpted
 
 __all__ = ["FILTERS", "apply_by_name", "apply_step", "python_name"]
 
@@ -34,7 +35,7 @@ class MeshLabFilter:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """The filter's own parameters, and then those of the method."""
-        return {parameter.name: parameter for parameter in (*self.own, *common_parameters())}
+        return {parameter.name: parameter for parameter in (*self.own, _SCULPT, *common_parameters())}
 
 
 def _normals(ms: Any, layer: PointSet, values: Values) -> None:
@@ -60,6 +61,7 @@ def _surface(ms: Any, layer: PointSet, values: Values) -> None:
     layers.add_surface(ms, surface.vertices, surface.faces, "Faraday mesh")
 
 
+_SCULPT = Parameter("sculpt", "str", "", "File of charges and cage points (JSON); empty: none")
 _ONSELECTED = Parameter("onselected", "bool", False, "Change the selected vertices only; all conduct")
 _TABLE = (
     MeshLabFilter("Compute Normal by Faraday Cage", _normals, (_ONSELECTED,)),
@@ -134,6 +136,6 @@ def _apply(ms: Any, name: str, values_of: Callable[[float], dict[str, Any]]) -> 
         step.append(Element("Param", parameter.write(values[key], diagonal)))
     try:
         with kept_script(ms, step):
-            entry.run(ms, PointSet(points), values)
-    except (ValueError, MeshingError, ml.PyMeshLabException) as error:
+            entry.run(ms, sculpted(PointSet(points), values["sculpt"] or None, params_of(values)), values)
+    except (ValueError, OSError, MeshingError, ml.PyMeshLabException) as error:
         raise ml.PyMeshLabException(f"Failed to apply filter: {name}\nDetails: {error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial import cKDTree
 from face_plugin.adapters._open3d_cloud import is_tensor, points_of
 from face_plugin.errors import require
 from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
+from face_plugin.filters.sculpt import sculpted
 from face_plugin.params import Params
 
 __all__ = ["create_from_point_cloud_face"]
@@ -23,6 +25,7 @@ def create_from_point_cloud_face(
     filter_interior: bool = True,
     trim: float = 0.0,
     params: Params | None = None,
+    sculpt: str | os.PathLike[str] | None = None,
 ) -> tuple[Any, Any]:
     """Reconstruct a surface as ``TriangleMesh.create_from_point_cloud_poisson`` does, needing no normals.
 
@@ -32,6 +35,8 @@ def create_from_point_cloud_face(
         Stays as it is; normals that it has are not used.
     depth, screened, filter_interior, trim, params
         As in `face_plugin.reconstruct`.
+    sculpt : path, optional
+        File of charges and cage points, as of ``face mesh --sculpt``.
 
     Returns
     -------
@@ -52,7 +57,7 @@ def create_from_point_cloud_face(
     o3d = require("open3d", extra="open3d")
     middle: list[Filter] = [Interior()] if filter_interior else []
     chain = Chain([Normals(params), *middle, Surface(depth, screened, "open3d", trim)])
-    layer = chain(PointSet(points_of(pcd)))
+    layer = chain(sculpted(PointSet(points_of(pcd)), sculpt, params))
     surface = layer.surface
     assert surface is not None  # the chain ends with it
     mesh = o3d.geometry.TriangleMesh(

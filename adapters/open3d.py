@@ -11,6 +11,7 @@ A script gains consistent outward normals by one line, or by none under `install
 from __future__ import annotations
 
 import logging
+import os
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from face_plugin.adapters._open3d_cloud import is_empty, points_of, select, set_
 from face_plugin.adapters._open3d_install import install, installed, uninstall
 from face_plugin.adapters._open3d_surface import create_from_point_cloud_face
 from face_plugin.filters import Interior, Normals, PointSet
+from face_plugin.filters.sculpt import sculpted
 from face_plugin.params import Params
 
 __all__ = [
@@ -41,6 +43,7 @@ def estimate_normals(
     max_nn: int | None = None,
     radius: float | None = None,
     params: Params | None = None,
+    sculpt: str | os.PathLike[str] | None = None,
 ) -> None:
     """Give the cloud outward normals, in place; they need no orientation afterwards.
 
@@ -55,11 +58,13 @@ def estimate_normals(
     search_param, fast_normal_computation, max_nn, radius
         Those of ``PointCloud.estimate_normals`` in the two APIs; FaCE has no use for them and logs that.
     params : Params, optional
+    sculpt : path, optional
+        File of charges and cage points, as of ``face mesh --sculpt``.
 
     Raises
     ------
     ValueError
-        Points that are not finite, or too few.
+        Points that are not finite, or too few; or an edit is refused.
 
     Examples
     --------
@@ -80,11 +85,16 @@ def estimate_normals(
         log.debug("FaCE has no use for %s", ", ".join(name for name, is_given in given.items() if is_given))
     if is_empty(pcd):
         return
-    set_normals(pcd, Normals(params)(PointSet(points_of(pcd))).normals)
+    layer = sculpted(PointSet(points_of(pcd)), sculpt, params)
+    set_normals(pcd, Normals(params)(layer).normals)
 
 
 def remove_interior_points(
-    pcd: Any, alpha: float | str | None = None, *, params: Params | None = None
+    pcd: Any,
+    alpha: float | str | None = None,
+    *,
+    params: Params | None = None,
+    sculpt: str | os.PathLike[str] | None = None,
 ) -> tuple[Any, Any]:
     """Drop the points inside the object; colours, covariances and attributes follow those that are kept.
 
@@ -94,7 +104,8 @@ def remove_interior_points(
         Stays as it is.
     alpha : float or {"auto", "dense", "sparse"}, optional
         Field strength below which space counts as inside, as in `Params`.
-    params : Params, optional
+    params, sculpt
+        As in `estimate_normals`.
 
     Returns
     -------
@@ -114,5 +125,5 @@ def remove_interior_points(
     """
     keep = np.ones(len(points_of(pcd)), dtype=np.bool_)
     if not is_empty(pcd):
-        keep = Interior(alpha, params)(PointSet(points_of(pcd))).keep
+        keep = Interior(alpha, params)(sculpted(PointSet(points_of(pcd)), sculpt, params)).keep
     return select(pcd, keep)

@@ -28,6 +28,7 @@ ICO = {"solid": "icosahedron"}
 SETTINGS: list[dict[str, Any]] = [
     {},
     {"grading": 0.4},
+    {"grading": 1.0},
     {"grading": 1.2},
     {"grading": 2.0},
     {"finest": 0.75},

@@ -98,14 +98,21 @@ def _strength_exact(gradients):  # type: ignore[no-untyped-def]
     """Largest eigenvalue of G^T G from the trigonometric solution of its characteristic cubic."""
     out = np.empty(len(gradients))
     for i in range(len(gradients)):
-        m = gradients[i].T @ gradients[i]
-        q = (m[0, 0] + m[1, 1] + m[2, 2]) / 3.0
-        off = m[0, 1] ** 2 + m[0, 2] ** 2 + m[1, 2] ** 2
-        p = np.sqrt(((m[0, 0] - q) ** 2 + (m[1, 1] - q) ** 2 + (m[2, 2] - q) ** 2 + 2.0 * off) / 6.0)
+        g = gradients[i]
+        # Scalars throughout, as above.
+        m00 = g[0, 0] * g[0, 0] + g[1, 0] * g[1, 0] + g[2, 0] * g[2, 0]
+        m11 = g[0, 1] * g[0, 1] + g[1, 1] * g[1, 1] + g[2, 1] * g[2, 1]
+        m22 = g[0, 2] * g[0, 2] + g[1, 2] * g[1, 2] + g[2, 2] * g[2, 2]
+        m01 = g[0, 0] * g[0, 1] + g[1, 0] * g[1, 1] + g[2, 0] * g[2, 1]
+        m02 = g[0, 0] * g[0, 2] + g[1, 0] * g[1, 2] + g[2, 0] * g[2, 2]
+        m12 = g[0, 1] * g[0, 2] + g[1, 1] * g[1, 2] + g[2, 1] * g[2, 2]
+        q = (m00 + m11 + m22) / 3.0
+        off = m01**2 + m02**2 + m12**2
+        p = np.sqrt(((m00 - q) ** 2 + (m11 - q) ** 2 + (m22 - q) ** 2 + 2.0 * off) / 6.0)
         largest = q
         if p > 1e-14 * q:
-            b00, b11, b22 = (m[0, 0] - q) / p, (m[1, 1] - q) / p, (m[2, 2] - q) / p
-            b01, b02, b12 = m[0, 1] / p, m[0, 2] / p, m[1, 2] / p
+            b00, b11, b22 = (m00 - q) / p, (m11 - q) / p, (m22 - q) / p
+            b01, b02, b12 = m01 / p, m02 / p, m12 / p
             half = 0.5 * (
                 b00 * (b11 * b22 - b12 * b12) - b01 * (b01 * b22 - b12 * b02) + b02 * (b01 * b12 - b11 * b02)
             )

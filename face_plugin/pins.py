@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -196,10 +197,21 @@ def rim(mesh: CageMesh, joined: NDArray[np.intp]) -> NDArray[np.intp]:
     >>> rim(mesh, np.array([0]))
     array([], dtype=int64)
     """
-    conducting = mesh.owner >= 0
-    inside = np.zeros(len(conducting), dtype=np.bool_)
+    inside = np.zeros(len(mesh.owner), dtype=np.bool_)
     inside[joined] = True
-    around = mesh.tets[inside[mesh.tets].any(axis=1)]
-    exposed = np.zeros(len(conducting), dtype=np.bool_)
-    exposed[around[~(conducting | inside)[around].all(axis=1)]] = True
-    return joined[exposed[joined]]
+    return joined[_exposed(mesh.tets, inside, inside | (mesh.owner >= 0))[joined]]
+
+
+@numba.njit(cache=True)
+def _exposed(
+    tets: NDArray[np.int32], inside: NDArray[np.bool_], conducting: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Whether a vertex (m,) shares a tetrahedron of one of `inside` with one that does not conduct."""
+    out = np.zeros(len(inside), dtype=np.bool_)
+    for t in range(len(tets)):
+        p, q, r, s = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
+        if (inside[p] or inside[q] or inside[r] or inside[s]) and not (
+            conducting[p] and conducting[q] and conducting[r] and conducting[s]
+        ):
+            out[p] = out[q] = out[r] = out[s] = True
+    return out

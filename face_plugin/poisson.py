@@ -21,7 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from face_plugin.meshers import CageMesh
 
@@ -262,7 +262,9 @@ def _cholmod(matrix: sparse.csc_matrix, *, required: bool) -> Solve | None:
     # "default" takes AMD where it fills little, and else METIS, where that is installed: at 59,000 unknowns
     # 1.8 s and 7.5 million entries in the factor, with AMD 2.8 s and 11.4 million.
     # One thread: the BLAS beneath sums in another order with more, and tiles must not differ from process to process.
-    with threadpool_limits(1, user_api="blas"):
+    # To look for the BLAS among all that is loaded takes milliseconds: once, not in every solve of a sculpt.
+    one_thread = ThreadpoolController().select(user_api="blas")
+    with one_thread.limit(limits=1):
         if hasattr(cholmod, "cho_factor"):
             factor = cholmod.cho_factor(matrix, order="default")
             solve = factor.solve
@@ -270,7 +272,7 @@ def _cholmod(matrix: sparse.csc_matrix, *, required: bool) -> Solve | None:
             solve = cholmod.cholesky(matrix, ordering_method="default")
 
     def limited(b: NDArray[np.float64]) -> NDArray[np.float64]:
-        with threadpool_limits(1, user_api="blas"):
+        with one_thread.limit(limits=1):
             return np.asarray(solve(b))
 
     return limited

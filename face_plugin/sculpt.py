@@ -6,9 +6,11 @@ import copy
 import dataclasses
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
-from typing import Literal, TypeVar
+from operator import index
+from typing import Literal, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,9 +78,11 @@ class Sculptable(ABC):
         Raises
         ------
         ValueError
-            A position is not finite, inside a ball, or on or outside the box. No edit is made then.
+            A position is not finite, inside a ball, or on or outside the box, or `alpha` is not in (0, 1). No
+            edit is made then.
         """
-        edits = self._sculptor.add_charges(positions, self.proxy_level if alpha is None else alpha)
+        level = self.proxy_level if alpha is None else float(Params(alpha=alpha).alpha)
+        edits = self._sculptor.add_charges(positions, level)
         self._follow()
         return edits
 
@@ -88,9 +92,9 @@ class Sculptable(ABC):
         Parameters
         ----------
         positions : (k, 3) array_like of float, in the coordinates of the input
-        radius : float or (k,) array_like of float, optional
-            How far they reach, in the unit of the input; by default 0.9 x the distance to the nearest input
-            point. Where there is no vertex within it, the nearest one joins.
+        radius : float or (k,) array_like of float or None, optional
+            How far they reach, in the unit of the input; by default, and where it is None, 0.9 x the distance
+            to the nearest input point. Where there is no vertex within it, the nearest one joins.
 
         Returns
         -------
@@ -117,15 +121,18 @@ class Sculptable(ABC):
         """The edits in the order in which they were made."""
         return tuple(self._sculptor.edits.values()) if "_sculptor" in self.__dict__ else ()
 
-    def remove_edits(self, edits: Iterable[Edit | int]) -> None:
-        """Take edits back, given as such or by their numbers.
+    def remove_edits(self, edits: Iterable[Edit | SupportsIndex] | Edit | SupportsIndex) -> None:
+        """Take edits back, one or several, given as such or by their numbers.
 
         Raises
         ------
         ValueError
             One of them is not, or no longer, there. None is removed then.
+        TypeError
+            It is neither an edit nor an integer.
         """
-        self._sculptor.remove(edit if isinstance(edit, int) else edit.number for edit in edits)
+        several = edits if isinstance(edits, Iterable) else (edits,)
+        self._sculptor.remove(edit.number if isinstance(edit, Edit) else index(edit) for edit in several)
         self._follow()
 
     def clear_edits(self) -> None:
@@ -148,19 +155,19 @@ class Sculptable(ABC):
         >>> len(face.sculpted(SculptFile(charges=((0.0, 0.0, 0.0),))).edits), len(face.edits)
         (1, 0)
         """
+        source = ""
         if not isinstance(sculpt, SculptFile):
-            sculpt = SculptFile.load(sculpt)
+            source, sculpt = f"{os.fspath(sculpt)}: ", SculptFile.load(sculpt)
         twin = copy.copy(self)
         twin.__dict__["_sculptor"] = self._sculptor.copy()
         # Cage points first: a charge is not to be put where they grow to.
-        given = [(point.position, point.radius) for point in sculpt.cage_points if point.radius is not None]
-        derived = [point.position for point in sculpt.cage_points if point.radius is None]
-        if given:
-            twin.add_cage_points([place for place, _ in given], [radius for _, radius in given])
-        if derived:
-            twin.add_cage_points(derived)
-        if sculpt.charges:
-            twin.add_charges(sculpt.charges)
+        with _naming(f"{source}cage_points: "):
+            if sculpt.cage_points:
+                places, reaches = zip(*((p.position, p.radius) for p in sculpt.cage_points), strict=True)
+                twin.add_cage_points(places, reaches)  # type: ignore[arg-type]  # None is a radius too
+        with _naming(f"{source}charges: "):
+            if sculpt.charges:
+                twin.add_charges(sculpt.charges)
         return twin
 
     def with_angles(self: Solved, angles: Literal["refined", "field"]) -> Solved:
@@ -201,3 +208,12 @@ class Sculptable(ABC):
             for name, member in vars(kind).items():
                 if isinstance(member, cached_property) and name not in LASTING:
                     self.__dict__.pop(name, None)
+
+
+@contextmanager
+def _naming(where: str) -> Iterator[None]:
+    """Put in front of a refusal where the edit stands."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{where}{error}") from error

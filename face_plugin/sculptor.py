@@ -125,7 +125,7 @@ class Sculptor:
         local = self._checked(positions)
         scale = self.cloud.frame.scale
         nearest = self._points.query(local)[0]
-        reach = REACH * nearest if radius is None else _radii(radius, len(local)) / scale
+        reach = _reach(radius, REACH * nearest * scale) / scale
         held = _vertices(self.edits, "charge")
         made = []
         for row, position in enumerate(np.array(positions, dtype=np.float64)):
@@ -238,11 +238,20 @@ def _vertices(edits: dict[int, Edit], kind: Kind) -> NDArray[np.intp]:
     return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *vertices]))
 
 
-def _radii(radius: ArrayLike, count: int) -> NDArray[np.float64]:
-    """Return one positive radius a position (count,)."""
-    radii = np.asarray(radius, dtype=np.float64)
-    if radii.shape not in ((), (count,)):
-        raise ValueError(f"radius must be one number or {count}, one a position; found shape {radii.shape}")
-    if not (np.isfinite(radii) & (radii > 0)).all():
-        raise ValueError(f"radius must be finite and > 0, found {radii.min() if radii.size else radii}")
-    return np.broadcast_to(radii, (count,))
+def _reach(radius: ArrayLike | None, derived: NDArray[np.float64]) -> NDArray[np.float64]:
+    """One positive radius a position (k,), in the unit of the input; `derived` (k,) where none is given."""
+    if radius is None:
+        return derived
+    given = np.asarray(radius, dtype=object)
+    if given.shape not in ((), derived.shape):
+        raise ValueError(
+            f"radius must be one number or {len(derived)}, one a position; found shape {given.shape}"
+        )
+    given = np.broadcast_to(given, derived.shape)
+    missing = np.array([one is None for one in given], dtype=np.bool_)
+    radii = np.where(missing, derived, 0.0)
+    radii[~missing] = given[~missing].astype(np.float64)
+    bad = ~missing & ~(np.isfinite(radii) & (radii > 0))
+    if bad.any():
+        raise ValueError(f"radius must be finite and > 0, found {radii[bad][0]}")
+    return radii

@@ -187,6 +187,13 @@ class Session:
         vertices, faces = isosurface(*fill_balls(self.face.mesh, self.face.vertex_strength), self.alpha)
         return self.face.frame.from_unit(vertices), faces
 
+    def middle_of_plane(self) -> NDArray[np.float64]:
+        """Position (3,) in the middle of `plane`, in the unit of the input."""
+        lower, upper = self.points.min(axis=0).astype(np.float64), self.points.max(axis=0).astype(np.float64)
+        middle, axis = 0.5 * lower + 0.5 * upper, self.plane.axis
+        middle[axis] = lower[axis] + self.plane.place * (upper[axis] - lower[axis])
+        return np.asarray(middle)
+
     def cut(self, resolution: int = 128) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
         """E_max on `plane`: vertices (k, 3) of a grid, its quads (q, 4), strength (k,)."""
         lower, upper = self.points.min(axis=0).astype(np.float64), self.points.max(axis=0).astype(np.float64)
@@ -196,8 +203,7 @@ class Session:
         grid = np.empty((resolution, resolution, 3))
         grid[..., u] = (lower[u] - margin + t * (upper[u] - lower[u] + 2 * margin))[:, None]
         grid[..., v] = lower[v] - margin + t * (upper[v] - lower[v] + 2 * margin)
-        axis = self.plane.axis
-        grid[..., axis] = lower[axis] + self.plane.place * (upper[axis] - lower[axis])
+        grid[..., self.plane.axis] = self.middle_of_plane()[self.plane.axis]
         row = (np.arange(resolution - 1)[:, None] * resolution + np.arange(resolution - 1)).ravel()
         quads = np.stack([row, row + resolution, row + resolution + 1, row + 1], axis=1)
         vertices = grid.reshape(-1, 3)

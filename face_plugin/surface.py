@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import logging
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from face_plugin.errors import MissingDependencyError, require
 from face_plugin.surface_size import suggested_depth, warn_if_too_large
 
-__all__ = ["Backend", "check_arguments", "poisson_reconstruction"]
+__all__ = ["Backend", "check_arguments", "is_closed", "poisson_reconstruction"]
 
 log = logging.getLogger(__name__)
 
@@ -23,6 +24,9 @@ FEWEST_POINTS = 4
 # Weight of the points in the screened variant: the value that Kazhdan and Hoppe recommend for linear
 # elements, and the default of both hosts.
 SCREENING = 4.0
+# Side of the cube in which is reconstructed, in that of the points: the hosts' own, and larger ones where the surface
+# leaves it and is cut open.
+SCALES = (1.1, 1.25, 1.5, 2.0)
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
 
@@ -88,7 +92,7 @@ def poisson_reconstruction(
         depth = suggested_depth(local)
     warn_if_too_large(local, depth)
     run = _open3d if backend == "open3d" else _pymeshlab
-    vertices, faces, densities = run(local, normals.astype(np.float64), int(depth), SCREENING * screened)
+    vertices, faces, densities = _closed(run, local, normals.astype(np.float64), int(depth), SCREENING * screened)
     if trim > 0 and densities is not None:
         vertices, faces, densities = _trimmed(vertices, faces, densities, trim)
     return vertices * size + origin, faces, densities
@@ -126,13 +130,38 @@ def _installed() -> Backend:
     )
 
 
-def _open3d(points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float) -> Mesh:
+def _closed(
+    run: Callable[..., Mesh], points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float
+) -> Mesh:
+    """Reconstruct in the smallest cube in which the surface is closed: over a wide gap it bulges beyond the points.
+
+    That of a sheet is closed in none, and is then that of the first.
+    """
+    made = [run(points, normals, depth, weight, SCALES[0])]
+    for scale in SCALES[1:]:
+        if is_closed(made[-1][1]):
+            return made[-1]
+        made.append(run(points, normals, depth, weight, scale))
+    return made[-1] if is_closed(made[-1][1]) else made[0]
+
+
+def is_closed(faces: NDArray[np.integer]) -> bool:
+    """Tell whether faces run along every edge as often in one direction as in the other: no boundary."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    size = int(edges.max(initial=0)) + 1
+    there, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
+    return len(faces) > 0 and np.array_equal(np.sort(there), np.sort(back))
+
+
+def _open3d(
+    points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
+) -> Mesh:
     o3d = require("open3d", extra="open3d")
     pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     pcd.normals = o3d.utility.Vector3dVector(normals)
     # One thread: with more, the order of summation, and so the surface, changes from run to run.
     mesh, densities = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
-        pcd, depth=depth, point_weight=weight, n_threads=1
+        pcd, depth=depth, point_weight=weight, scale=scale, n_threads=1
     )
     return (
         np.asarray(mesh.vertices).copy(),
@@ -141,13 +170,15 @@ def _open3d(points: NDArray[np.float64], normals: NDArray[np.float64], depth: in
     )
 
 
-def _pymeshlab(points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float) -> Mesh:
+def _pymeshlab(
+    points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
+) -> Mesh:
     pymeshlab = require("pymeshlab", extra="pymeshlab")
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
     # One thread, as with Open3D.
     meshes.generate_surface_reconstruction_screened_poisson(
-        depth=depth, pointweight=weight, preclean=False, threads=1
+        depth=depth, pointweight=weight, scale=scale, preclean=False, threads=1
     )
     mesh = meshes.current_mesh()
     return mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64), None

@@ -7,32 +7,28 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.errors import FaceError, MissingDependencyError, require
+from face_plugin.errors import FaceError, require
 from face_plugin.sculpt import Edit
 from face_plugin.session import MODES, Plane, Session
 from face_plugin.solver import FaCE
+from face_plugin.viewport import Up, knife, stand, window
 
-__all__ = ["LIBRARIES", "Viewer"]
+__all__ = ["Viewer"]
 
 log = logging.getLogger(__name__)
-
-Up = Literal["x", "y", "z"]
-
-LIBRARIES = "libegl1 libgl1 libx11-6"
-"""Debian's packages of what polyscope loads; they bring Mesa's software renderer along."""
 
 # A press and a release this near to each other, in pixels, are a click; farther apart, the view was turned.
 STILL = 4.0
 # Limits of the slider of alpha and of the colours of log10 E_max.
 ALPHA = (1e-4, 0.5)
 DECADES = (-4.0, 0.0)
-# Where the camera stands at first: azimuth and elevation in degrees, and distance in diagonals of the points.
-STANDPOINT, DISTANCE = (35.0, 20.0), 1.3
+# Radius of a point, and length and radius of its normal, in radii of a ball: what is behind shows between them.
+POINT, ARROW = 0.45, (2.0, 0.12)
 SIDE, INSIDE, PROXY = (0.45, 0.6, 0.8), (0.85, 0.3, 0.25), (0.95, 0.8, 0.55)
 NORMAL = (0.3, 0.3, 0.35)
 CHARGE, SHIELD, MESH = (1.0, 0.75, 0.0), (0.1, 0.6, 0.2), (0.8, 0.8, 0.78)
@@ -50,6 +46,8 @@ class Viewer:
         Draw without a window, for `screenshot`.
     up : {"x", "y", "z"}
         Axis of the input that points upward.
+    cut : {"x", "y", "z"}, optional
+        Begin with the object cut open in the middle, across that axis, and the field shown there.
     size : (width, height) in pixels
 
     Raises
@@ -75,21 +73,29 @@ class Viewer:
         mesh_file: str | os.PathLike[str] = "sculpted.ply",
         headless: bool = False,
         up: Up = "z",
+        cut: Up | None = None,
         size: tuple[int, int] = (1280, 800),
     ) -> None:
         self.session = session
         self.message = "look: drag to turn, scroll to zoom"
         self.files = {"sculpt": str(sculpt_file), "mesh": str(mesh_file)}
         self._drawn: dict[str, Any] = {}
+        self._inside: NDArray[np.bool_] = np.zeros(len(session.points), dtype=np.bool_)
         self._surface: tuple[FaCE, float, bool] | None = None
-        self._ps: Any = _window(headless)
+        self._ps: Any = window(headless)
         self._gui: Any = require("polyscope.imgui", extra="viewer")
         self._ps.set_window_size(*size)
         self._ps.set_up_dir(f"{up}_up")
         self._ps.remove_all_structures()
         self._ps.set_user_callback(self.frame)
+        self._knife: Any = knife(self._ps)
+        self.open = cut is not None
+        if cut is not None:
+            session.plane = Plane("xyz".index(cut), session.plane.place)
+        # What is to be seen at first: the points, and where the field is shown.
+        shown = session.points if cut is None else np.concatenate([session.points, session.cut(2)[0]])
+        self._scale = stand(self._ps, shown, up, size)
         self.draw()
-        self._stand(up)
 
     def show(self) -> None:
         """Open the window and return when it is closed."""
@@ -127,40 +133,50 @@ class Viewer:
     def draw(self) -> None:
         """Bring the picture up to date; what has not changed is left alone."""
         face, alpha, plane = self.session.face, self.session.alpha, self.session.plane
-        self._update("points", (face, alpha, self.session.automatic), self._draw_points)
+        # An edit is to be seen at once: which points are interior takes longer, and is told one frame later.
+        if not self._update("points", (face,), self._draw_points):
+            self._update("interior", (face, alpha, self.session.automatic), self._draw_interior)
         self._update("proxy", (face, alpha), self._draw_proxy)
         self._update("field", (face, plane), self._draw_field)
+        self._update("knife", (plane, self.open), self._place_knife)
         self._update("edits", (face,), self._draw_edits)
         # A surface that does not go with the points any more would mislead.
         if self._surface is not None and self._surface != (face, alpha, self.session.automatic):
             self._ps.remove_surface_mesh("surface", error_if_absent=False)
             self._surface = None
 
-    def _stand(self, up: Up) -> None:
-        """Put the camera where `face plot` has it by default."""
-        k, (azimuth, elevation) = "xyz".index(up), np.radians(STANDPOINT)
-        upward, ahead, side = np.eye(3)[k], np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3]
-        level = np.cos(azimuth) * ahead + np.sin(azimuth) * side
-        towards = np.cos(elevation) * level + np.sin(elevation) * upward
-        lower, upper = self.session.points.min(axis=0), self.session.points.max(axis=0)
-        middle = 0.5 * lower.astype(np.float64) + 0.5 * upper
-        away = DISTANCE * float(np.linalg.norm(upper.astype(np.float64) - lower))
-        self._ps.look_at_dir(middle + away * towards, middle, upward)
-
-    def _update(self, name: str, state: tuple[Any, ...], draw: Callable[[], Any]) -> None:
+    def _update(self, name: str, state: tuple[Any, ...], draw: Callable[[], Any]) -> bool:
+        """Draw if the state is another than at the last time, and tell whether it was."""
         # The states are compared by identity: equal arrays in another cage are another drawing.
         known = self._drawn.get(name, ((), None))[0]
-        if len(known) != len(state) or any(a is not b and a != b for a, b in zip(known, state, strict=True)):
-            self._drawn[name] = state, draw()
+        if len(known) == len(state) and all(a is b or a == b for a, b in zip(known, state, strict=True)):
+            return False
+        self._drawn[name] = state, draw()
+        return True
 
     def _draw_points(self) -> None:
         session = self.session
-        cloud = self._ps.register_point_cloud("points", session.points, radius=0.004)
+        cloud = self._ps.register_point_cloud("points", session.points)
+        size = float(np.median(session.face.balls.radii)) * session.face.frame.scale
+        cloud.set_radius(POINT * size, relative=False)
+        length, radius = ARROW
         cloud.add_vector_quantity(
-            "normals", session.face.normals(), enabled=True, length=0.02, radius=0.0012, color=NORMAL
+            "normals",
+            length * size * session.face.normals(),
+            enabled=True,
+            vectortype="ambient",
+            radius=radius * size / self._scale,
+            color=NORMAL,
         )
-        inside = session.interior()
-        cloud.add_color_quantity("interior", np.where(inside[:, None], INSIDE, SIDE), enabled=True)
+        self._colour(self._inside)
+
+    def _draw_interior(self) -> None:
+        self._inside = self.session.interior()
+        self._colour(self._inside)
+
+    def _colour(self, inside: NDArray[np.bool_]) -> None:
+        colours = np.where(inside[:, None], INSIDE, SIDE)
+        self._ps.get_point_cloud("points").add_color_quantity("interior", colours, enabled=True)
 
     def _draw_proxy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         vertices, faces = self.session.proxy()
@@ -178,11 +194,24 @@ class Viewer:
         decades = np.log10(np.maximum(strength, 10.0 ** DECADES[0]))
         mesh.add_scalar_quantity("log10 E_max", decades, enabled=True, vminmax=DECADES, cmap="viridis")
 
+        # Half transparent: what lies behind, points inside the object among it, is what it is to explain.
+        mesh.set_transparency(0.5)
+        mesh.set_ignore_slice_plane(self._knife, True)
+
+    def _place_knife(self) -> None:
+        """Take away what lies on the upper side of the plane, where the camera stands at first."""
+        self._knife.set_active(self.open)
+        if self.open:
+            normal = -np.eye(3)[self.session.plane.axis]
+            self._knife.set_pose(self.session.middle_of_plane(), normal)
+            self._ps.get_surface_mesh("field").set_enabled(True)
+
     def _draw_edits(self) -> None:
         for name, kind, colour in (("charges", "charge", CHARGE), ("cage points", "cage", SHIELD)):
             places = [edit.places for edit in self.session.face.edits if edit.kind == kind]
             if places:
-                self._ps.register_point_cloud(name, np.concatenate(places), radius=0.01, color=colour)
+                cloud = self._ps.register_point_cloud(name, np.concatenate(places), radius=0.01, color=colour)
+                cloud.set_ignore_slice_plane(self._knife, True)
             else:
                 self._ps.remove_point_cloud(name, error_if_absent=False)
 
@@ -216,6 +245,7 @@ class Viewer:
         if moved or turned:
             session.plane = Plane(axis, place)
             self._ps.get_surface_mesh("field").set_enabled(True)
+        _, self.open = gui.Checkbox("cut open", self.open)
         for name, save in (("sculpt", session.save_sculpt), ("mesh", session.save_mesh)):
             if gui.Button(f"save {name}"):
                 with self._reporting():
@@ -253,27 +283,3 @@ def _describe(edit: Edit) -> str:
     if edit.kind == "cage":
         return f"{len(edit.places)} vertices of the mesh joined the cage"
     return f"charge at ({', '.join(f'{x:.4g}' for x in edit.places[0])})"
-
-
-def _window(headless: bool) -> Any:
-    """Return polyscope, initialised: once a process, for it is global state."""
-    ps = require("polyscope", extra="viewer")
-    if ps.is_initialized():
-        return ps
-    ps.set_verbosity(0)
-    ps.set_program_name("face")
-    ps.set_use_prefs_file(False)
-    ps.set_ground_plane_mode("none")
-    ps.set_allow_headless_backends(headless)
-    try:
-        ps.init()
-    except RuntimeError as error:
-        if headless:
-            raise MissingDependencyError(
-                f"polyscope cannot draw without a display here ({error}). "
-                f"On Debian or Ubuntu: apt-get install {LIBRARIES}"
-            ) from error
-        raise FaceError(f"there is no display to open a window on ({error})") from error
-    # Every frame that is asked for is drawn, and none left out to keep to a rate.
-    ps.set_frame_tick_limit_fps_mode("ignore_limits")
-    return ps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,7 +11,7 @@ from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
 from face_plugin.solver import FaCE, Progress
 
-__all__ = ["Sculpt"]
+__all__ = ["Sculpt", "sculpted"]
 
 
 @dataclass(frozen=True)
@@ -62,3 +63,18 @@ class Sculpt(Filter):
             # Edits need the one mesh that they are made in, whatever its size.
             cage = FaCE(layer.points[layer.keep], cage.params, progress=progress)
         return layer.replace(cage=cage.sculpted(self.file))
+
+
+def sculpted(
+    layer: PointSet, file: str | os.PathLike[str] | None, params: Params | None = None
+) -> PointSet:
+    """Return `layer` with the edits of a sculpt file; as it is where that is None. For adapters.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> layer = PointSet(np.eye(3))
+    >>> sculpted(layer, None) is layer
+    True
+    """
+    return layer if file is None else Sculpt(os.fspath(file), params)(layer)

@@ -189,6 +189,41 @@ def test_obj_centre_lines_with_problems(tmp_path):
     )
 
 
+def test_obj_stations_that_are_not_finite(tmp_path):
+    path = tmp_path / "strokes.obj"
+    path.write_text(LINES.replace("v 1 0 0", "v nan 0 0") + "v inf 0 0\n")
+    sketch = read_sketch(path, width=0.5)
+    # The first stroke goes on past its lost station.
+    assert sketch.stroke_count == 2
+    assert sketch.areas.sum() == pytest.approx(2.0)
+    assert "left out 1 stations whose position is not finite" in sketch.problems
+
+
+def test_comment_that_talks_of_width(tmp_path):
+    path = tmp_path / "strokes.obj"
+    for words in ("the width: even", "width 1..2", "width 0.2.1", "width -"):
+        path.write_text(f"# {words}\n" + LINES + NORMALS)
+        assert read_sketch(path).areas.sum() == pytest.approx(4.0)  # the spacing, as without it
+
+
+def test_strips_of_ply(tmp_path):
+    path = tmp_path / "strips.ply"
+    header = HEADER.format(vertices=10, faces=0).replace(
+        "end_header", "element tristrips 1\nproperty list int int vertex_indices\nend_header"
+    )
+    vertices = [f"{x} {y} {z} 0 0 1 77" for z, count in ((0, 3), (1, 2)) for x in range(count) for y in (0, 1)]
+    path.write_text(header + "\n".join(vertices) + "\n11 0 1 2 3 4 5 -1 6 7 8 9\n")
+    sketch = read_sketch(path)
+    assert sketch.stroke_count == 2
+    assert sketch.areas.sum() == pytest.approx(3.0)
+    a, b, c = (sketch.vertices[sketch.faces[:, k]] for k in range(3))
+    assert len(np.unique(np.sign(np.cross(b - a, c - a)[:, 2]))) == 1  # all turned alike
+    for row in ("3 0 -1 1", "4 0 0 1 1"):
+        path.write_text(header + "\n".join(vertices) + f"\n{row}\n")
+        with pytest.raises(ValueError, match=r"strips.ply: the sketch has no ribbon left"):
+            read_sketch(path)
+
+
 def test_estimated_normals_follow_a_curved_drawing(tmp_path):
     # The body of the teapot as centre lines only: rings of latitude, all of one ellipsoid.
     whole = teapot_sketch(tremor=0.0)
@@ -223,8 +258,9 @@ def test_estimated_normals_follow_a_curved_drawing(tmp_path):
 def test_unusable_files(tmp_path, name, text, message):
     path = tmp_path / name
     path.write_text(text)
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=message) as caught:
         read_sketch(path)
+    assert name in str(caught.value)
 
 
 def test_bad_width(tmp_path):

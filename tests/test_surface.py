@@ -173,3 +173,12 @@ def test_two_implementations_give_the_same_picture():
     assert max(there.max(), back.max()) < 0.03
     assert surfaces[0].result.interior is not None
     np.testing.assert_array_equal(surfaces[0].result.interior, surfaces[1].result.interior)
+
+
+@pytest.mark.parametrize("backend", INSTALLED)
+def test_a_surface_that_bulges_over_a_gap_is_closed(backend):
+    """In the hosts' own cube that of a ball without a cap of 60 degrees is cut open."""
+    ball = shapes.sphere(1500)
+    kept = ball.points[:, 2] < 0.5
+    _, faces, _ = poisson_reconstruction(ball.points[kept], ball.normals[kept], depth=6, backend=backend)
+    assert open_edges(faces) == 0

@@ -293,6 +293,35 @@ def test_a_frame_shows_the_points_and_their_sides(hand, tmp_path):
     assert hand.viewer.session.face.edits == ()
 
 
+def test_the_points_fill_the_window(hand, session, tmp_path):
+    """Whatever their shape and the axis that is up, and none is cut off."""
+    for up in "xyz":
+        viewer = Viewer(session, headless=True, size=SIZE, up=up)
+        viewer.screenshot(tmp_path / "frame.png")
+        drawn = np.ptp(np.asarray(Image.open(tmp_path / "frame.png").convert("RGB")).astype(float), axis=2) > 20
+        rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+        assert max(np.ptp(rows) / SIZE[1], np.ptp(columns) / SIZE[0]) > 0.7
+        assert rows[0] > 0
+        assert rows[-1] < SIZE[1] - 1
+        assert columns[0] > 0
+        assert columns[-1] < SIZE[0] - 1
+
+
+def test_cutting_it_open_shows_a_charge_inside(hand, session, tmp_path):
+    session.mode = "carve"
+    session.click([0.0, 0.0, 0.75])
+    closed = hand.picture(tmp_path / "closed.png")
+    hand.press("cut open", across=0.05)
+    opened = hand.picture(tmp_path / "opened.png")
+    assert hand.viewer.open
+    assert polyscope.get_surface_mesh("field").is_enabled()
+    assert yellow(opened) > yellow(closed) + 30
+    hand.press("cut open", across=0.05)
+    assert not hand.viewer.open
+    viewer = Viewer(session, headless=True, size=SIZE, cut="x")
+    assert (viewer.open, session.plane.axis) == (True, 0)
+
+
 def test_carving_by_the_mouse(hand, tmp_path):
     viewer, session = hand.viewer, hand.viewer.session
     before = ((session.face.normals() * session.points).sum(axis=1)).copy()
@@ -338,6 +367,22 @@ def test_a_double_click_is_one_edit(hand):
     hand.click(*np.array(SIZE) / 2)
     hand.click(*np.array(SIZE) / 2)
     assert len(session.face.edits) == 1
+
+
+def test_an_edit_is_seen_before_the_interior_is_known(hand, session, monkeypatch):
+    hand.frames(2)
+    asked = []
+    monkeypatch.setattr(session, "interior", lambda: asked.append(session.face) or np.ones(1500, dtype=bool))
+    session.mode = "carve"
+    session.click([0.0, 0.0, 0.75])
+    hand.frames(1)
+    assert asked == []
+    assert polyscope.has_point_cloud("charges")
+    hand.frames(3)
+    assert asked == [session.face]
+    session.alpha = 0.02
+    hand.frames(1)
+    assert len(asked) == 2
 
 
 def test_shielding_on_the_field(hand, tmp_path):
@@ -411,7 +456,7 @@ def test_a_picture_from_the_command_line(tmp_path, capsys):
     np.save(tmp_path / "shell.npy", shapes.spherical_shell(400).points)
     SculptFile(charges=((0.0, 0.0, 0.0),)).save(tmp_path / "edits.json")
     words = ["view", tmp_path / "shell.npy", "--sculpt", tmp_path / "edits.json", "--up", "y"]
-    words += ["--screenshot", tmp_path / "shell.png", "--json", "--quiet"]
+    words += ["--cut", "z", "--screenshot", tmp_path / "shell.png", "--json", "--quiet"]
     assert main([str(word) for word in words]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["points"], summary["charges"], summary["cage_points"]) == (400, 1, 0)

@@ -6,9 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from face_plugin.cli.console import Console
 from face_plugin.cli.options import (
     add_command,
@@ -20,6 +17,7 @@ from face_plugin.cli.options import (
     surface_of,
 )
 from face_plugin.io import CLOUD_SUFFIXES, MESH_SUFFIXES, check_output, read_cloud, write_cloud, write_mesh
+from face_plugin.surface import is_closed
 
 __all__ = ["register"]
 
@@ -85,11 +83,3 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     text = f"{output}: {len(surface.faces):,} triangles, {'closed' if closed else 'open'}, from "
     text += f"{len(cloud) - dropped:,} of {len(cloud):,} points"
     return summary, text + (f" ({dropped:,} inside the object left out)" if dropped else "")
-
-
-def is_closed(faces: NDArray[np.integer]) -> bool:
-    """Tell whether faces run along every edge as often in one direction as in the other: no boundary."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    size = int(edges.max(initial=0)) + 1
-    there, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
-    return len(faces) > 0 and np.array_equal(np.sort(there), np.sort(back))

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from face_plugin.cli.console import Console
-from face_plugin.cli.mesh import is_closed
 from face_plugin.cli.options import (
     add_command,
     add_interior,
@@ -18,6 +17,7 @@ from face_plugin.cli.options import (
     surface_of,
 )
 from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
+from face_plugin.surface import is_closed
 
 __all__ = ["register"]
 

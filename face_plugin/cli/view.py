@@ -33,6 +33,9 @@ def register(commands: Any) -> None:
     )
     parser.add_argument("--screenshot", metavar="PNG", type=Path, help="write a picture instead of opening a window")
     parser.add_argument("--up", choices=("x", "y", "z"), default="z", help="the axis that points upward [default: z]")
+    parser.add_argument(
+        "--cut", choices=("x", "y", "z"), help="cut the object open across this axis, and show the field there"
+    )
     add_method(parser)
 
 
@@ -62,6 +65,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         mesh_file=mesh_file,
         headless=args.screenshot is not None,
         up=args.up,
+        cut=args.cut,
     )
     if args.screenshot is None:
         viewer.show()

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from face_plugin.ribbons.strokes import Stroke, tangents
 
-_WIDTH = re.compile(r"#.*\bwidth\b[\s:=]*([-+.\deE]+)", re.IGNORECASE)
+_WIDTH = re.compile(r"#.*\bwidth\b[\s:=]*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?![\w.])", re.IGNORECASE)
 _NEIGHBOURS = 12
 
 
@@ -42,6 +42,7 @@ def polylines_to_strokes(
         There is no line, or no way to tell the width.
     """
     centres, widths, chains = _parse(lines, problems)
+    chains = _finite(centres, chains, problems)
     if not chains:
         raise ValueError("the file has neither faces (f) nor lines (l): it holds no strokes")
     loose = len(centres) - len(np.unique(np.concatenate(chains)))
@@ -102,6 +103,17 @@ def _parse(
     return np.array(rows, dtype=np.float64).reshape(-1, 3), found, whole
 
 
+def _finite(
+    centres: NDArray[np.float64], chains: list[NDArray[np.int64]], problems: list[str]
+) -> list[NDArray[np.int64]]:
+    """Strokes without the stations that are not finite; what was drawn before and after one is joined."""
+    finite = np.asarray(np.isfinite(centres).all(axis=1))
+    lost = sum(int((~finite[chain]).sum()) for chain in chains)
+    if lost:
+        problems.append(f"left out {lost} stations whose position is not finite")
+    return [chain[finite[chain]] for chain in chains if finite[chain].any()]
+
+
 def vertex_indices(words: list[str], seen: int) -> NDArray[np.int64]:
     """Turn corners of an OBJ line after `seen` vertices into indices from 0; -1 where it is not a number."""
     out = np.full(len(words), -1, dtype=np.int64)
@@ -129,6 +141,8 @@ def _spacing(centres: NDArray[np.float64], chains: list[NDArray[np.int64]]) -> f
 def _plane_normals(centres: NDArray[np.float64], chains: list[NDArray[np.int64]]) -> NDArray[np.float64]:
     """Fit planes to the nearest stations of all strokes; normals (m, 3) at right angles to the stroke."""
     used = np.unique(np.concatenate(chains))
+    # A vertex of no stroke may be anything, and needs no normal.
+    centres = np.where(np.isin(np.arange(len(centres)), used)[:, None], centres, centres[used[0]])
     _, index = cKDTree(centres[used]).query(centres, k=min(_NEIGHBOURS, len(used)))
     near = centres[used][np.atleast_2d(index.reshape(len(centres), -1))]
     near = near - near.mean(axis=1, keepdims=True)

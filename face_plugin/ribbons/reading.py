@@ -26,10 +26,10 @@ def read_sketch(path: str | os.PathLike[str], *, width: float | None = None) -> 
     """Read a sketch, tolerantly: what is wrong with some of it is left out, logged, and listed in `problems`.
 
     PLY: the layout of SurfaceBrush (a vertex at the stroke's centre and one at each border for every station,
-    the three with the normal of the brush, quads between stations), or any strips of triangles or quads.
-    Strokes are taken from an integer property ``stroke`` (also ``stroke_id``) of the faces or the vertices,
-    else from connectivity. OBJ: faces, with strokes from ``o`` or ``g`` where there are several, else from
-    connectivity; or centre lines (``v`` and ``l``), which are swept into ribbons (see
+    the three with the normal of the brush, quads between stations), or any strips of triangles or quads, as
+    faces or ``tristrips``. Strokes are taken from an integer property ``stroke`` (also ``stroke_id``) of the
+    faces or the vertices, else from connectivity. OBJ: faces, with strokes from ``o`` or ``g`` where there are
+    several, else from connectivity; or centre lines (``v`` and ``l``), which are swept into ribbons (see
     `polylines_to_strokes`).
 
     Parameters
@@ -65,17 +65,19 @@ def read_sketch(path: str | os.PathLike[str], *, width: float | None = None) -> 
         raise ValueError(f"{path}: extension {path.suffix!r}; allowed are {', '.join(SKETCH_SUFFIXES)}")
     if width is not None and not (np.isfinite(width) and width > 0):
         raise ValueError(f"width: found {width}, allowed is a positive number")
-    if path.suffix.lower() == ".ply":
-        cloud, problems = read_ply(path)
-        polygons, ids = _ply_polygons(cloud)
-    else:
-        cloud, problems = read_cloud(path), []
-        polygons, ids = _obj_polygons(cloud)
-        if not polygons:
-            strokes = polylines_to_strokes(cloud.source, cloud.normals, width, problems)
-            return ribbons(strokes, problems)
-    vertices = cloud.points.astype(np.float64)
-    return assemble(vertices, polygons, ids=ids, normals=cloud.normals, problems=problems, source=cloud)
+    cloud, problems = read_ply(path) if path.suffix.lower() == ".ply" else (read_cloud(path), [])
+    try:
+        if path.suffix.lower() == ".ply":
+            polygons, ids = _ply_polygons(cloud)
+        else:
+            polygons, ids = _obj_polygons(cloud)
+            if not polygons:
+                strokes = polylines_to_strokes(cloud.source, cloud.normals, width, problems)
+                return ribbons(strokes, problems)
+        vertices = cloud.points.astype(np.float64)
+        return assemble(vertices, polygons, ids=ids, normals=cloud.normals, problems=problems, source=cloud)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
 
 
 def _by_length(corners: list[NDArray[np.int64]]) -> Polygons:
@@ -90,8 +92,8 @@ def _by_length(corners: list[NDArray[np.int64]]) -> Polygons:
 def _ply_polygons(cloud: CloudFile) -> tuple[Polygons, NDArray[np.int64] | None]:
     faces = next((e.data for e in cloud.source.elements if e.name == "face"), None)
     name = next((n for n in _CORNERS if faces is not None and n in faces.dtype.names), None)
-    if faces is None or name is None:
-        return [], None
+    if faces is None or name is None or not len(faces):
+        return _ply_strips(cloud)
     corners = faces[name]
     if corners.dtype.kind == "O":
         polygons = _by_length([np.asarray(row, dtype=np.int64) for row in corners])
@@ -107,6 +109,27 @@ def _ply_polygons(cloud: CloudFile) -> tuple[Polygons, NDArray[np.int64] | None]
                 ids[rows] = cloud.attributes[label][np.clip(group[:, 0], 0, len(cloud) - 1)]
             return polygons, ids
     return polygons, None
+
+
+def _ply_strips(cloud: CloudFile) -> tuple[Polygons, NDArray[np.int64] | None]:
+    """Triangles of ``tristrips``: every vertex makes one with the two before it, and -1 begins another strip."""
+    strips = next((e.data for e in cloud.source.elements if e.name == "tristrips"), None)
+    name = next((n for n in _CORNERS if strips is not None and n in strips.dtype.names), None)
+    if strips is None or name is None:
+        return [], None
+    triangles = [np.empty((0, 3), dtype=np.int64)]
+    for row in strips[name]:
+        corners = np.asarray(row, dtype=np.int64)
+        for strip in np.split(corners, np.flatnonzero(corners == -1)):
+            strip = strip[strip != -1]
+            if len(strip) >= 3:
+                three = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
+                three[1::2] = three[1::2, [1, 0, 2]]
+                triangles.append(three)
+    # Two equal neighbours turn a strip round a corner; their triangles are none.
+    found = np.concatenate(triangles)
+    found = found[(found[:, 0] != found[:, 1]) & (found[:, 1] != found[:, 2]) & (found[:, 0] != found[:, 2])]
+    return [(np.arange(len(found)), found)] if len(found) else [], None
 
 
 def _obj_polygons(cloud: CloudFile) -> tuple[Polygons, NDArray[np.int64] | None]:

@@ -5,16 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-__all__ = ["Balls", "build_balls", "local_spacing", "separation", "thin"]
+from face_plugin.sheets import bulk, ramp, sheet_reach
+
+__all__ = ["Balls", "build_balls", "local_spacing", "separation"]
 
 # Smallest distance between balls, as a fraction of the distance to the 8th neighbour. Even samplings keep every point
 # and so do both sides of a plate down to 0.4 spacings; near-duplicates of registered scans go.
 THINNING = 0.35
+# On a sheet, as a fraction of the distance to the next one, at most so many spacings and so much of the longest side.
+COARSENING = 0.3
+COARSEST = 4.0
+WIDEST = 0.04
+# A sheet is where `bulk` is below these values, fully and not at all.
+SHEET = (0.02, 0.1)
+# Neighbours among which the next sheet is looked for, and among which the least favourable quarter decides.
+SHEET_NEIGHBOURS = 96
+AROUND = 12
+FEWEST = 25
 
 Solid = Literal["octahedron", "icosahedron"]
 
@@ -65,9 +76,12 @@ def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArr
     Parameters
     ----------
     points : (n, 3) float64
+        In the canonical frame, whose longest side is 1.
     cage_spacing : float or None
-        The same for all, in the points' unit; None = 0.35 x the distance to the 8th neighbour, which removes
-        near-duplicates and keeps even samplings, and 0 for fewer points than that.
+        The same for all, in the points' unit. None = the larger of two, and 0 for fewer points than 25:
+        0.35 x the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings; and, on
+        sheets, 0.3 x the distance to the next one, at most 4 spacings and at most 0.04. A coarse cage bridges gaps
+        as wide as its own spacing; and where nothing else is near, its side of the sheet is as right as a fine one's.
 
     Examples
     --------
@@ -76,66 +90,17 @@ def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArr
     """
     if cage_spacing is not None:
         return np.full(len(points), cage_spacing)
-    if len(points) < 9:
+    if len(points) < FEWEST:
         return np.zeros(len(points))
-    eighth = cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0]
-    return np.asarray(THINNING * eighth)
-
-
-def thin(
-    points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
-) -> NDArray[np.intp]:
-    """Take a Poisson-disk subset: points in random order, each unless one within its separation was taken.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-    separation : (n,) float64, in the points' unit
-    seed : int
-
-    Returns
-    -------
-    (k,) intp
-        Rows of the points taken, ascending. Every point has one of them within its separation.
-
-    Examples
-    --------
-    >>> line = np.arange(4.0)[:, None] * np.array([[1.0, 0, 0]])
-    >>> len(thin(line, np.full(4, 0.5), seed=0))
-    4
-    """
-    order = np.random.default_rng(seed).permutation(len(points))
-    cell = float(separation.max())
-    if cell <= 0:
-        return np.arange(len(points))
-    tree = cKDTree(points)
-    nearest = tree.query(points, k=2, workers=-1)[0][:, 1]
-    crowded = np.flatnonzero(nearest < separation)
-    taken = np.ones(len(points), dtype=np.bool_)
-    if len(crowded) == 0:
-        return np.flatnonzero(taken)
-    lists = tree.query_ball_point(points[crowded], separation[crowded] * (1 - 1e-12), workers=-1)
-    length = np.fromiter((len(x) for x in lists), dtype=np.int64, count=len(lists))
-    start = np.zeros(len(points) + 1, dtype=np.int64)
-    start[crowded + 1] = length
-    np.cumsum(start, out=start)
-    neighbour = np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])
-    return np.flatnonzero(_greedy(order, start, neighbour))
-
-
-@numba.njit(cache=True)
-def _greedy(
-    order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    taken = np.zeros(len(order), dtype=np.bool_)
-    for i in order:
-        free = True
-        for k in range(start[i], start[i + 1]):
-            if taken[neighbour[k]]:
-                free = False
-                break
-        taken[i] = free
-    return taken
+    distance, neighbour = cKDTree(points).query(points, k=min(SHEET_NEIGHBOURS + 1, len(points)), workers=-1)
+    spacing = distance[:, 1:7].mean(axis=1)
+    _, reach = sheet_reach(points, distance, neighbour, spacing)
+    # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.
+    around = neighbour[:, : AROUND + 1]
+    reach = np.percentile(reach[around], 25.0, axis=1)
+    sheet = 1.0 - np.percentile(ramp(bulk(points, neighbour), SHEET)[around], 75.0, axis=1)
+    coarse = np.minimum(np.minimum(COARSENING * reach * sheet, COARSEST * spacing), WIDEST)
+    return np.asarray(np.maximum(THINNING * distance[:, 8], coarse))
 
 
 def build_balls(

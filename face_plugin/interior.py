@@ -5,7 +5,7 @@ alpha-isosurface of E_max (section 3.5). Shielded is not the same as inside, tho
 dent that is open to the outside, and at a fixed alpha the surface in there is lost. The oriented points tell the two
 apart. Their winding number is 1 inside and 1/2 on the surface, dents included, so ``alpha="auto"`` asks for both: the
 point is shielded, and the other points enclose it. In a sharp crease, and between the layers of a misregistered scan,
-the number is nearly 1 at the surface as well; but a step along the normal leads out of those, and not out of the object.
+the number is nearly 1 at the surface as well; but a step along the normal leads out of those, not out of the object.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ class Params:
     solid: Literal["octahedron", "icosahedron"] = "octahedron"
     """Solid that approximates a ball: 6 or 12 vertices."""
     cage_spacing: float | None = None
-    """Smallest distance between two balls, in the unit of the input; 0 = a ball at every point;
-    None = 0.35 x the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings."""
+    """Smallest distance between two balls, in the unit of the input; 0 = a ball at every point; None = coarse on
+    sheets with nothing else near, fine where walls are thin, no near-duplicates: see `face_plugin.cage.separation`."""
 
     # Domain and mesh
     padding: float = 0.1

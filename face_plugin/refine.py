@@ -13,15 +13,13 @@ E_max knows the side of nearly every point, but its gradient is accurate to ten 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from face_plugin.fits import plane_fit, quadric_fits
 from face_plugin.normals import unit
-from face_plugin.sheets import back_to_back, bulk, far_sheet, next_sheet
+from face_plugin.sheets import back_to_back, bulk, ramp, sheet_reach
 from face_plugin.winding import DipoleTree
 
 __all__ = ["refine"]
@@ -134,14 +132,12 @@ def _sides(
     """Turn stray normals (n, 3) round; those `kept` stay as they are."""
     points = tree.points
     shape = bulk(points, neighbour)
-    sheet = 1.0 - _ramp(shape, SHEET)
-    near = next_sheet(points, distance, neighbour, spacing)
-    # What was found among the neighbours is nearer than anything that lies beyond them.
-    far = np.where(near < distance[:, -1], near, np.maximum(near, far_sheet(points, spacing, NEIGHBOURS)))
+    sheet = 1.0 - ramp(shape, SHEET)
     low, high = SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing
+    near, far = sheet_reach(points, distance, neighbour, spacing)
     narrow = np.clip(SIDE_WIDTH * near, low, high)
     wide = np.maximum(SIDE_WIDTH * far, low)
-    vote = VOTE * _ramp(shape, NO_SHEET) * _ramp(np.log(np.maximum(strength, 1e-9)), np.log(STANDING_OUT))
+    vote = VOTE * ramp(shape, NO_SHEET) * ramp(np.log(np.maximum(strength, 1e-9)), np.log(STANDING_OUT))
     vote = vote[:, None] * rough
     normals = rough
     for step in range(SIDE_STEPS):
@@ -181,10 +177,5 @@ def choose_quadric(
     chosen = np.zeros(len(points), dtype=np.intp)
     for s in range(1, len(counts)):
         chosen[(typical[s] < RESIDUAL_GROWTH * smallest) & (chosen == s - 1)] = s
-    scatter = _ramp(typical[0], SCATTER) * _ramp(typical[1] / smallest, GROWTH)
+    scatter = ramp(typical[0], SCATTER) * ramp(typical[1] / smallest, GROWTH)
     return fitted[chosen, np.arange(len(points))], scatter
-
-
-def _ramp(values: NDArray[np.float64], ends: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """0 at the first end, 1 at the second, linear between."""
-    return np.asarray(np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.cage import thin
 from face_plugin.fits import plane_fit
+from face_plugin.thinning import thin
 
-__all__ = ["back_to_back", "bulk", "far_sheet", "next_sheet"]
+__all__ = ["back_to_back", "bulk", "next_sheet", "ramp", "sheet_reach"]
 
 # A neighbour farther than this many spacings, within 37 degrees of the normal, belongs to another sheet.
 SHEET_DISTANCE = 1.2
@@ -71,7 +73,7 @@ def next_sheet(
         along = np.abs(np.einsum("nd,nd->n", points[neighbour[:, k]] - points, line))
         hit = (along > SHEET_COSINE * distance[:, k]) & (distance[:, k] > SHEET_DISTANCE * spacing)
         np.minimum(reach, np.where(hit, distance[:, k], np.inf), out=reach)
-    return reach
+    return np.asarray(reach)
 
 
 def back_to_back(
@@ -103,16 +105,33 @@ def back_to_back(
     return np.asarray(pattern[near].mean(axis=1) > PLATE_MAJORITY)
 
 
-def far_sheet(
-    points: NDArray[np.float64], spacing: NDArray[np.float64], neighbours: int
-) -> NDArray[np.float64]:
-    """`next_sheet` (n,) seen by evenly spaced points only, each `FAR_SPACING` spacings from the others: so much farther.
+def sheet_reach(
+    points: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    neighbour: NDArray[np.intp],
+    spacing: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance (n,) to the next sheet as `next_sheet` has it, and the same or farther where that sees none.
 
-    Strokes of a sketch are sampled densely and lie many spacings apart.
+    Strokes of a sketch are sampled densely and lie many spacings apart: among evenly spaced points, each `FAR_SPACING`
+    spacings from the others, the same number of neighbours reaches so much farther.
     """
+    near = next_sheet(points, distance, neighbour, spacing)
     few = points[thin(points, FAR_SPACING * spacing, seed=0)]
     if len(few) <= BULK_NEIGHBOURS:
-        return np.zeros(len(points))
-    distance, neighbour = cKDTree(few).query(few, k=min(neighbours + 1, len(few)), workers=-1)
-    wide = next_sheet(few, distance, neighbour, distance[:, 1:7].mean(axis=1))
-    return np.asarray(wide[cKDTree(few).query(points, workers=-1)[1]])
+        return near, near
+    far, among = cKDTree(few).query(few, k=min(distance.shape[1], len(few)), workers=-1)
+    wide = next_sheet(few, far, among, far[:, 1:7].mean(axis=1))[cKDTree(few).query(points, workers=-1)[1]]
+    # What was found among the neighbours is nearer than anything that lies beyond them.
+    return near, np.where(near < distance[:, -1], near, np.maximum(near, wide))
+
+
+def ramp(values: NDArray[np.float64], ends: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """0 at the first end, 1 at the second, linear between.
+
+    Examples
+    --------
+    >>> ramp(np.array([0.0, 0.25, 2.0]), (0.0, 1.0))
+    array([0.  , 0.25, 1.  ])
+    """
+    return np.asarray(np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0))

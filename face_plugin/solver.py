@@ -24,6 +24,7 @@ from face_plugin.poisson import Poisson
 from face_plugin.refine import refine
 from face_plugin.sculpt import Sculptable, SculptFile
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
+from face_plugin.thinning import thin
 from face_plugin.tiles.choose import EngineLike, in_tiles
 
 __all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
@@ -114,7 +115,7 @@ class FaCE(Sculptable):
         # 2. A conducting ball at each point, near-duplicates left out.
         with self._stage("cage"):
             spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
-            rows = cage.thin(self.cloud.points, cage.separation(self.cloud.points, spacing), params.seed)
+            rows = thin(self.cloud.points, cage.separation(self.cloud.points, spacing), params.seed)
             self.balls = cage.build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
             )

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from face_plugin.cage import thin
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.solver import Progress
+from face_plugin.thinning import thin
 
 __all__ = ["Thin"]
 

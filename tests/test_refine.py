@@ -80,7 +80,7 @@ def test_few_points_are_enough():
     assert refine(points, unit(points), np.ones(12)).shape == (12, 3)
 
 
-def bar(n: int = 80, thickness: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+def bar(n: int = 80, thickness: float = 0.8) -> tuple[np.ndarray, np.ndarray]:
     """A round bar along x, thinner than the spacing of 1 of the points on it: they wind around it like a screw."""
     angle = 2.4 * np.arange(n)
     normals = np.stack([np.zeros(n), np.cos(angle), np.sin(angle)], axis=1)

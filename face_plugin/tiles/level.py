@@ -16,6 +16,7 @@ from face_plugin.meshers import CageMesh
 from face_plugin.meshers.select import build_mesh
 from face_plugin.params import Params
 from face_plugin.poisson import Poisson
+from face_plugin.thinning import thin
 
 __all__ = ["Level", "solve_level"]
 
@@ -100,7 +101,7 @@ def _mesh(
     seed: int,
     clock: Clock,
 ) -> tuple[cage.Balls, CageMesh]:
-    rows = cage.thin(points, separation, seed)
+    rows = thin(points, separation, seed)
     balls = cage.build_balls(points, rows, radius=params.ball_radius, solid=params.solid, seed=seed)
     if box is not None:
         balls = _within(balls, box)

@@ -59,7 +59,7 @@ def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     elif store.params.angles == "refined":
         normals = refine(seen.points, votes, seen.strength, seen.near)
     clock()
-    found = {"normals": normals[seen.own]}
+    found: dict[str, NDArray[np.generic]] = {"normals": normals[seen.own]}
     if store.interior:
         found["enclosed"] = interior.enclosed(seen.points, normals, seen.strength)[seen.own]
     clock()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin import cage, cloud
+from face_plugin.thinning import thin
 from face_plugin.tiles.store import Store
 
 __all__ = ["Surroundings", "surroundings"]
@@ -67,7 +68,7 @@ def surroundings(store: Store, tile: int, width: float) -> Surroundings:
     rows = place[owned[np.argsort(subset.row[owned])]]
     separation = np.full(len(leader), THINNING * spacing)
     separation[rows] = 0.0
-    kept = cage.thin(subset.points[leader], separation, store.params.seed)
+    kept = thin(subset.points[leader], separation, store.params.seed)
     leader = leader[kept]
     return Surroundings(
         points=subset.points[leader],

@@ -259,7 +259,7 @@ def interior_alpha(store: Store) -> float:
 
 
 def tile_seconds(store: Store) -> dict[str, float]:
-    """Seconds by stage that the tiles took, all together."""
+    """Processor seconds by stage that the tiles took, all together: those that passed depend on who else works here."""
     seconds: dict[str, float] = {}
     for stage, names in (("field", TILE_STAGES), ("normals", POLISH_STAGES)):
         for tile in range(store.tiles):

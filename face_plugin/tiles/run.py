@@ -158,7 +158,9 @@ def solve_store(
             store.save()
         solved: Store = store
         timed("tiles", lambda: _run(running, solve_tile, solved, "field", "tiles", report))
+        start = time.perf_counter()
         write_far(solved)
+        timings["far"] = time.perf_counter() - start
         timed("normals", lambda: _run(running, polish_tile, solved, "normals", "normals", report))
     return store, timings
 

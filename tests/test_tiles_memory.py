@@ -38,5 +38,5 @@ def test_this_machine():
 def test_tiles_shrink_to_the_memory():
     assert fitting_tile_points(tile_memory(5_000), 20_000) == pytest.approx(5_000, abs=1)
     assert fitting_tile_points(1e12, 20_000) == 20_000
-    with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d\d GB, found 0\.25"):
+    with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d\d GB, found 0\.26"):
         fitting_tile_points(PROCESS_BYTES, 20_000)

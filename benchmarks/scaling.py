@@ -1,7 +1,7 @@
-"""Time by stage, memory and accuracy against the number of points, in one piece and in tiles.
+r"""Time by stage, memory and accuracy against the number of points, in one piece and in tiles.
 
     python benchmarks/scaling.py --sizes 1000 5000 20000 50000 100000 --output out
-    python benchmarks/scaling.py --sizes 20000 100000 200000 --tiled 20000 100000 200000 500000 1000000 2000000 \\
+    python benchmarks/scaling.py --sizes 20000 100000 200000 --tiled 20000 100000 200000 500000 1000000 2000000 \
         --workers 1 2 --each-up-to 200000 --output out
     python benchmarks/scaling.py --sizes 20000 100000 --tiled 20000 100000 --clean --add --output out
 
@@ -27,7 +27,7 @@ from clouds import teapot_with_box
 from numpy.typing import NDArray
 from scaling_report import compare, fits, plot, row
 
-SAMPLED_EVERY = 0.2
+SAMPLED_EVERY = 0.5
 # Where the strength is lower, the side of a point inside follows from the last digits of a shielded field.
 VISIBLE = 1e-6
 # A point lies at the border of its tile where one of so many neighbours of another tile is within two spacings.
@@ -137,13 +137,14 @@ def measure(path: str, tile_points: int | None = None, workers: int | None = Non
     # Loading the compiled code from its cache is not what is to be measured; workers load theirs in the run.
     estimate_normals(sphere(200).points)
     reference = Path(path).with_suffix(".one.npz")
-    cpu, start = cpu_seconds(), time.perf_counter()
+    cpu, own, start = cpu_seconds(), time.process_time(), time.perf_counter()
     if tile_points is None:
         result = estimate_normals(points, Params(tile_points=len(points)))
         normals, timings, tile, record = result.normals, result.timings, None, {}
     else:
         normals, timings, tile, record = solve_in_tiles(points, tile_points, workers)
     record |= {
+        "own_cpu_seconds": time.process_time() - own,
         "points": len(points),
         "tile_points": tile_points,
         "workers": workers,
@@ -164,11 +165,11 @@ def measure(path: str, tile_points: int | None = None, workers: int | None = Non
             ("same", ~interior),
             ("same_all", np.ones_like(same)),
             ("same_visible", visible),
-            ("same_border", at_border),
-            ("same_elsewhere", ~at_border),
+            ("same_border", visible & at_border),
+            ("same_elsewhere", visible & ~at_border),
         ):
             record[name] = float(same[chosen].mean())
-        record["border_points"] = int(at_border.sum())
+        record["border_points"] = int((visible & at_border).sum())
     record["load"] = os.getloadavg()[1]
     print(json.dumps(record))
 

@@ -11,7 +11,8 @@ __all__ = ["compare", "fits", "groups", "plot", "row", "stage_seconds"]
 
 # The stages of one piece; tiles add them up over all tiles, in processor time.
 STAGES = (
-    "cloud", "coarse", "cage", "domain", "mesh", "poisson", "field", "normals", "scene", "refine", "confidence", "merge",
+    "cloud", "coarse", "cage", "domain", "mesh", "poisson", "field", "normals", "scene", "refine", "confidence",
+    "merge",
 )  # fmt: skip
 # Fits begin here: below, loading weighs too much, and tiles are smaller than they are meant to be.
 FITTED_FROM = {False: 15_000, True: 90_000}
@@ -27,9 +28,9 @@ def row(record: Record) -> str:
     same = ""
     if "same" in record:
         same = (
-            f"  same as one piece: {100 * record['same']:.3f} % outside, {100 * record['same_visible']:.3f} % where "
-            f"there is a field, {100 * record['same_all']:.3f} % of all, {100 * record['same_border']:.3f} % of "
-            f"{record['border_points']} at borders, {100 * record['same_elsewhere']:.3f} % elsewhere"
+            f"  same as one piece: {100 * record['same']:.3f} % outside, {100 * record['same_all']:.3f} % of all, "
+            f"{100 * record['same_visible']:.3f} % where there is a field, there {100 * record['same_border']:.3f} % "
+            f"of {record['border_points']} at borders, {100 * record['same_elsewhere']:.3f} % elsewhere"
         )
     return (
         f"{record['points']:>9,} {record['shape']}  {how:<15}  {record['seconds']:8.1f} s  "

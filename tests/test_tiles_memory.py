@@ -40,3 +40,13 @@ def test_tiles_shrink_to_the_memory():
     assert fitting_tile_points(1e12, 20_000) == 20_000
     with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d\d GB, found 0\.26"):
         fitting_tile_points(PROCESS_BYTES, 20_000)
+
+
+def test_small_tiles_are_mostly_halo():
+    def a_point(tile):
+        return (tile_memory(tile) - PROCESS_BYTES) / tile
+
+    # Measured with tiles of 3,000, 10,000 and 50,000 points: 42, 32 and 16 kB for each point that a tile owns.
+    assert a_point(3_000) == pytest.approx(42e3, rel=0.15)
+    assert a_point(10_000) == pytest.approx(32e3, rel=0.15)
+    assert a_point(50_000) > 16e3

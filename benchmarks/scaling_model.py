@@ -7,8 +7,8 @@ The assumptions, all of which the output repeats:
 1. A tile costs what one did in the largest run measured: its time does not depend on the size of the cloud.
 2. A worker has a core for itself, as fast as those here, and reads the shared folder at no cost. Processor time stands
    for time.
-3. The last tiles leave workers idle: each of both stages ends with the worker that has most tiles, a fifth more work
-   than the mean tile in each.
+3. The last tiles leave workers idle: both stages end with the workers that have most tiles, each of which costs a fifth
+   more than the mean. (Not with two workers.)
 4. Before, between and after, one process reads the cloud three times, brings the coarse level's points together and
    merges the tiles: in proportion to the points. The line through the two largest runs gives it; its constant part is
    the coarse level.
@@ -96,14 +96,17 @@ def coarse_points(points: int) -> int:
 def predict(one: list[Record], tiled: list[Record], points: int, workers: int) -> Prediction:
     """Predict a run from those measured, each list in the order of its sizes."""
     base, before = tiled[-1], tiled[-2]
+    tile_points = base["points"] / base["tiles"]
     serial = (base["own_cpu_seconds"] - before["own_cpu_seconds"]) / (base["points"] - before["points"])
     constant = max(base["own_cpu_seconds"] - serial * base["points"], 0.0)
     coarse, coarse_before = coarse_points(points), coarse_points(base["points"])
     size = np.log([r["points"] for r in one])
     power, factor = np.polyfit(size, np.log([r["cpu_seconds"] for r in one]), 1)
     slope = one[-1]["peak_gb"] / one[-1]["points"]
-    tiles = max(1, round(points / base["tile_points"]))
+    tiles = -(-points // base["tile_points"])
     a_tile = sum(v for name, v in base["timings"].items() if name.startswith("tiles: ")) / base["tiles"]
+    # Tiles of a small run are of another size than they are meant to be.
+    a_tile *= points / tiles / tile_points
     uneven = IMBALANCE if workers > 2 else 1.0
     more = coarse / coarse_before - 1.0
     return Prediction(

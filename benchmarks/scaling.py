@@ -1,9 +1,12 @@
-"""Time by stage and peak memory against the number of points, in one piece and in tiles.
+r"""Time by stage, memory and accuracy against the number of points, in one piece and in tiles.
 
     python benchmarks/scaling.py --sizes 1000 5000 20000 50000 100000 --output out
-    python benchmarks/scaling.py --sizes 20000 100000 --tiled 20000 100000 1000000 --workers 1 2 --output out
+    python benchmarks/scaling.py --sizes 20000 100000 200000 --tiled 20000 100000 200000 500000 1000000 2000000 \
+        --workers 1 2 --each-up-to 200000 --output out
+    python benchmarks/scaling.py --sizes 20000 100000 --tiled 20000 100000 --clean --add --output out
 
-Every measurement runs in a process of its own. Figures go to scaling.json and a table, curves to scaling.png.
+Every measurement runs in a process of its own. Figures go to scaling.json and a table, curves to scaling.png, and what
+follows for more points and machines is computed by `scaling_model.py` from scaling.json.
 """
 
 from __future__ import annotations
@@ -21,12 +24,17 @@ from typing import Any
 
 import numpy as np
 from clouds import teapot_with_box
+from numpy.typing import NDArray
+from scaling_report import compare, fits, plot, row
 
-# The stages of one piece; tiles add them up over all tiles.
-STAGES = ("cloud", "coarse", "cage", "domain", "mesh", "poisson", "field", "normals", "refine")
-SAMPLED_EVERY = 0.2
+SAMPLED_EVERY = 0.5
 # Where the strength is lower, the side of a point inside follows from the last digits of a shielded field.
 VISIBLE = 1e-6
+# A point lies at the border of its tile where one of so many neighbours of another tile is within two spacings.
+NEIGHBOURS = 24
+BORDER = 2.0
+# Points drawn for each one that is left where those inside are left out.
+OUTSIDE = 1.5
 
 
 def main() -> None:
@@ -34,7 +42,9 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="*", default=[1000, 5000, 20000, 50000, 100000])
     parser.add_argument("--tiled", type=int, nargs="*", default=[], help="sizes to solve in tiles")
     parser.add_argument("--workers", type=int, nargs="*", default=[2], help="processes for the tiles")
+    parser.add_argument("--each-up-to", type=int, default=10**9, help="larger sizes: the last of --workers only")
     parser.add_argument("--tile-points", type=int, default=40_000)
+    parser.add_argument("--clean", action="store_true", help="leave out the points inside")
     parser.add_argument("--output", type=Path, default=Path("out"))
     parser.add_argument("--add", action="store_true", help="to the figures that scaling.json holds already")
     parser.add_argument("--measure", help=argparse.SUPPRESS)
@@ -47,21 +57,29 @@ def main() -> None:
     records = json.loads(store.read_text()) if args.add and store.exists() else []
     with tempfile.TemporaryDirectory() as folder:
         for n in sorted({*args.sizes, *args.tiled}):
-            cloud = teapot_with_box(n)
             path = Path(folder) / f"{n}.npz"
-            np.savez(path, points=cloud.points, normals=cloud.normals, interior=cloud.interior)
+            write_cloud(path, n, clean=args.clean)
             jobs: list[dict[str, Any]] = [{}] if n in args.sizes else []
             if n in args.tiled:
-                jobs += [{"tile_points": min(args.tile_points, n // 2), "workers": k} for k in args.workers]
+                workers = args.workers if n <= args.each_up_to else args.workers[-1:]
+                jobs += [{"tile_points": min(args.tile_points, n // 2), "workers": k} for k in workers]
             for job in jobs:
-                records.append(in_a_process({"path": str(path), **job}))
+                shape = "clean" if args.clean else "interiors"
+                records.append({"shape": shape, **in_a_process({"path": str(path), **job})})
                 print(row(records[-1]), flush=True)
                 store.write_text(json.dumps(records, indent=1))
             path.unlink()
             path.with_suffix(".one.npz").unlink(missing_ok=True)
-    for line in fits(records):
+    for line in [*fits(records), *compare(records)]:
         print(line)
     plot(records, args.output / "scaling.png")
+
+
+def write_cloud(path: Path, n: int, *, clean: bool) -> None:
+    """Write a cloud of about n points and what is true of them."""
+    cloud = teapot_with_box(round(OUTSIDE * n) if clean else n)
+    kept = ~cloud.interior if clean else np.ones(len(cloud.points), dtype=np.bool_)
+    np.savez(path, points=cloud.points[kept], normals=cloud.normals[kept], interior=cloud.interior[kept])
 
 
 def in_a_process(job: dict[str, Any]) -> dict[str, Any]:
@@ -69,13 +87,14 @@ def in_a_process(job: dict[str, Any]) -> dict[str, Any]:
     child = subprocess.Popen(
         [sys.executable, __file__, "--measure", json.dumps(job)], stdout=subprocess.PIPE, text=True
     )
-    peak = 0.0
+    peaks = {"peak_gb": 0.0, "parent_gb": 0.0, "worker_gb": 0.0}
     stop = threading.Event()
 
     def watch() -> None:
-        nonlocal peak
         while not stop.wait(SAMPLED_EVERY):
-            peak = max(peak, sum(proportional_memory(pid) for pid in family(child.pid)))
+            parent, *workers = (proportional_memory(pid) / 1e9 for pid in family(child.pid))
+            now = {"peak_gb": parent + sum(workers), "parent_gb": parent, "worker_gb": max(workers, default=0.0)}
+            peaks.update({name: max(peaks[name], value) for name, value in now.items()})
 
     watcher = threading.Thread(target=watch)
     watcher.start()
@@ -84,13 +103,14 @@ def in_a_process(job: dict[str, Any]) -> dict[str, Any]:
     watcher.join()
     if child.returncode:
         raise SystemExit(f"measurement failed: {job}")
-    return {**json.loads(out.splitlines()[-1]), "peak_gb": peak / 1e9}
+    return {**json.loads(out.splitlines()[-1]), **peaks}
 
 
 def family(pid: int) -> list[int]:
     """Return a process and all that descend from it."""
     try:
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        threads = list(Path(f"/proc/{pid}/task").iterdir())
+        children = [child for thread in threads for child in (thread / "children").read_text().split()]
     except OSError:
         return [pid]
     return [pid, *(member for child in children for member in family(int(child)))]
@@ -111,118 +131,89 @@ def measure(path: str, tile_points: int | None = None, workers: int | None = Non
     """Measure one run, and print it as the last line."""
     from face_plugin import Params, estimate_normals
     from face_plugin.shapes import sphere
-    from face_plugin.tiles import estimate_tiled
 
     with np.load(path) as arrays:
         points, truth, interior = arrays["points"], arrays["normals"], arrays["interior"]
-    if tile_points is None:
-        # Loading the compiled code from its cache is not what is to be measured.
-        estimate_normals(sphere(200).points)
-        params = Params(tile_points=len(points))
-    else:
-        engine = "serial" if workers == 1 else "processes"
-        params = Params(tile_points=tile_points, workers=workers, engine=engine)
-    cpu, start = cpu_seconds(), time.perf_counter()
-    result = (estimate_normals if tile_points is None else estimate_tiled)(points, params)
-    seconds = time.perf_counter() - start
-    right = np.einsum("ij,ij->i", result.normals, truth) > 0
+    # Loading the compiled code from its cache is not what is to be measured; workers load theirs in the run.
+    estimate_normals(sphere(200).points)
     reference = Path(path).with_suffix(".one.npz")
-    record = {
+    cpu, own, start = cpu_seconds(), time.process_time(), time.perf_counter()
+    if tile_points is None:
+        result = estimate_normals(points, Params(tile_points=len(points)))
+        normals, timings, tile, record = result.normals, result.timings, None, {}
+    else:
+        normals, timings, tile, record = solve_in_tiles(points, tile_points, workers)
+    record |= {
+        "own_cpu_seconds": time.process_time() - own,
         "points": len(points),
         "tile_points": tile_points,
         "workers": workers,
-        "seconds": seconds,
+        "seconds": time.perf_counter() - start,
         "cpu_seconds": cpu_seconds() - cpu,
-        "timings": result.timings,
-        "aligned": float(right[~interior].mean()),
+        "timings": timings,
     }
+    right = np.einsum("ij,ij->i", normals, truth) > 0
+    record["aligned"] = float(right[~interior].mean())
     if tile_points is None:
-        np.savez(reference, normals=result.normals, strength=result.strength)
-    elif reference.exists():
+        np.savez(reference, normals=normals, strength=result.strength)
+    elif reference.exists() and tile is not None:
         with np.load(reference) as one:
-            same = np.einsum("ij,ij->i", one["normals"], result.normals) > 0
+            same = np.einsum("ij,ij->i", one["normals"], normals) > 0
             visible = one["strength"] > VISIBLE
-        record["same"] = float(same[~interior].mean())
-        record["same_all"] = float(same.mean())
-        record["same_visible"] = float(same[visible].mean())
+        at_border = border(points, tile)
+        for name, chosen in (
+            ("same", ~interior),
+            ("same_all", np.ones_like(same)),
+            ("same_visible", visible),
+            ("same_border", visible & at_border),
+            ("same_elsewhere", visible & ~at_border),
+        ):
+            record[name] = float(same[chosen].mean())
+        record["border_points"] = int((visible & at_border).sum())
     record["load"] = os.getloadavg()[1]
     print(json.dumps(record))
+
+
+def solve_in_tiles(
+    points: NDArray[np.float64], tile_points: int, workers: int | None
+) -> tuple[NDArray[np.float64], dict[str, float], NDArray[np.int64], dict[str, Any]]:
+    """Solve in tiles as `estimate_normals` does, and tell as well which tile owns each point (n,)."""
+    from face_plugin import Params
+    from face_plugin.tiles.run import collect, solve_store, tile_seconds
+    from face_plugin.tiles.sources import ArraySource
+
+    engine = "serial" if workers == 1 else "processes"
+    params = Params(tile_points=tile_points, workers=workers, engine=engine)
+    with tempfile.TemporaryDirectory(prefix="face-") as name:
+        folder = Path(name)
+        store, timings = solve_store(folder, ArraySource(points), params)
+        start = time.perf_counter()
+        normals = collect(store)["normals"]
+        timings = {**timings, "merge": time.perf_counter() - start, **tile_seconds(store)}
+        tile = np.empty(len(points), dtype=np.int64)
+        tile[store.rows()] = np.repeat(np.arange(store.tiles), np.diff(store.start))
+        sizes = {
+            "tiles": store.tiles,
+            "coarse_points": len(np.load(folder / "voxels.npz")["points"]),
+            "coarse_gb": (folder / "coarse.npz").stat().st_size / 1e9,
+            "disk_gb": sum(file.stat().st_size for file in folder.iterdir()) / 1e9,
+        }
+    return normals, timings, tile, sizes
+
+
+def border(points: NDArray[np.float64], tile: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Find the points (n,) with one of another tile within two spacings."""
+    from scipy.spatial import cKDTree
+
+    distance, near = cKDTree(points).query(points, k=NEIGHBOURS + 1, workers=-1)
+    reach = BORDER * distance[:, 1:7].mean(axis=1, keepdims=True)
+    return np.asarray(((tile[near] != tile[:, None]) & (distance < reach)).any(axis=1))
 
 
 def cpu_seconds() -> float:
     """Processor time of this process and of those it waited for."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
-
-
-def row(record: dict[str, Any]) -> str:
-    """Return a line of the table."""
-    how = "one piece" if record["tile_points"] is None else f"tiles, {record['workers']} proc."
-    timings = {name: stage_seconds(record, name) for name in STAGES}
-    stages = "  ".join(f"{name} {seconds:.1f}" for name, seconds in timings.items() if seconds > 0)
-    same = ""
-    if "same" in record:
-        same = (
-            f"  same as one piece: {100 * record['same']:.3f} % outside, {100 * record['same_visible']:.3f} % "
-            f"where E > {VISIBLE:g}, {100 * record['same_all']:.3f} % of all"
-        )
-    return (
-        f"{record['points']:>9,}  {how:<15}  {record['seconds']:8.1f} s  (cpu {record['cpu_seconds']:.1f})  "
-        f"{record['peak_gb']:.2f} GB  aligned {100 * record['aligned']:.2f} %{same}  [{stages}]"
-    )
-
-
-def stage_seconds(record: dict[str, Any], stage: str) -> float:
-    """Return the seconds of a stage: of all tiles together where there are any, else as they passed."""
-    timings = record["timings"]
-    return float(timings.get(f"tiles: {stage}", timings.get(stage, 0.0)))
-
-
-def fits(records: list[dict[str, Any]]) -> list[str]:
-    """Fit ``time = constant * points ** exponent`` from 20,000 points on; below, loading weighs too much."""
-    lines = []
-    for (tiled, workers), group in groups(records).items():
-        large = [r for r in group if r["points"] > 15_000]
-        if len(large) > 1:
-            size = np.log([r["points"] for r in large])
-            for name in ("seconds", "cpu_seconds", "peak_gb"):
-                exponent = np.polyfit(size, np.log([r[name] for r in large]), 1)[0]
-                label = f"tiles, {workers} processes" if tiled else "one piece"
-                lines.append(f"{label}: {name} ~ points ** {exponent:.2f}")
-    return lines
-
-
-def groups(records: list[dict[str, Any]]) -> dict[tuple[bool, int | None], list[dict[str, Any]]]:
-    """Return the records of a kind, in the order of their sizes."""
-    found: dict[tuple[bool, int | None], list[dict[str, Any]]] = {}
-    for record in sorted(records, key=lambda r: r["points"]):
-        found.setdefault((record["tile_points"] is not None, record["workers"]), []).append(record)
-    return found
-
-
-def plot(records: list[dict[str, Any]], path: Path) -> None:
-    """Draw time and memory against the number of points."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
-    for (tiled, workers), group in groups(records).items():
-        label = f"tiles, {workers} process{'es' if workers != 1 else ''}" if tiled else "one piece"
-        size = [r["points"] for r in group]
-        left.loglog(size, [r["seconds"] for r in group], "o-", label=label)
-        right.loglog(size, [r["peak_gb"] for r in group], "o-", label=label)
-        if not tiled:
-            for stage in STAGES:
-                seconds = [max(stage_seconds(r, stage), 1e-3) for r in group]
-                left.loglog(size, seconds, "--", linewidth=0.8, label=stage)
-    left.set(xlabel="points", ylabel="seconds", title="Time")
-    right.set(xlabel="points", ylabel="GB, all processes", title="Peak memory")
-    for axes in (left, right):
-        axes.grid(alpha=0.3, which="both")
-        axes.legend(fontsize=7)
-    figure.savefig(path, dpi=130)
 
 
 if __name__ == "__main__":

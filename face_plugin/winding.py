@@ -27,6 +27,9 @@ LEAF = 8
 OPENING = 0.4
 # Deep enough for 2**48 leaves.
 STACK = 100
+# Points that share one walk down the tree, and sources added at a time: a list stays in the first cache.
+GROUP = 16
+LIST = 512
 
 
 class DipoleTree:
@@ -104,23 +107,26 @@ class DipoleTree:
         """Columns of -4 pi grad w, and 4 pi w."""
         dipoles = np.ascontiguousarray(normals * self.areas[:, None])
         moments = _moments(dipoles, self._start, self._stop)
-        own = positions is None
+        themselves = positions is None
         queries = self.points if positions is None else np.ascontiguousarray(positions)
-        out = np.empty((len(queries), 4))
+        out = np.zeros((len(queries), 4))
 
-        def run(rows: slice) -> None:
+        def run(groups: slice) -> None:
             _dipole_sums(
-                rows.start, rows.stop, queries, own, self.points, dipoles, eps, self._start, self._stop, self._child,
-                self._centre, self._radius, moments, opening, out,
+                groups.start, groups.stop, queries, themselves, self.points, dipoles, eps, self._start, self._stop,
+                self._child, self._centre, self._radius, moments, opening, out,
             )  # fmt: skip
 
-        in_threads(run, len(queries))
+        in_threads(run, -(-len(queries) // GROUP), 512 // GROUP)
         return out
 
 
-def in_threads(run: Callable[[slice], None], count: int) -> None:
-    """Call ``run(slice)`` for pieces of `count` rows on all cores; a row is computed alone, so any split is equal."""
-    pieces = max(1, min(os.cpu_count() or 1, count // 512))
+def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> None:
+    """Call ``run(slice)`` for pieces of `count` rows on all cores; a row is computed alone, so any split is equal.
+
+    A core gets at least `least` rows.
+    """
+    pieces = max(1, min(os.cpu_count() or 1, count // least))
     bounds = np.linspace(0, count, 4 * pieces + 1).astype(int)
     slices = [slice(a, b) for a, b in itertools.pairwise(bounds)]
     with ThreadPoolExecutor(pieces) as pool:
@@ -166,51 +172,103 @@ def _moments(dipoles, start, stop):  # type: ignore[no-untyped-def]
     return sums
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _dipole_sums(  # type: ignore[no-untyped-def]
-    first, last, queries, own, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
-):
-    """-4 pi grad w = sum_j m_j / r^3 - 3 (m_j . d) d / r^5 and 4 pi w = sum_j m_j . d / r^3.
+@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _add(count, source, queries, eps, first, last, out):  # type: ignore[no-untyped-def]
+    """Add what sources cause at the queries of a group; columns of positions and dipoles, so that it vectorises.
 
-    With d = p_j - x, r^2 = |d|^2 + eps^2 and m_j = a_j n_j; a query that is a point itself skips its own dipole.
+    -4 pi grad w = sum_j m_j / r^3 - 3 (m_j . d) d / r^5 and 4 pi w = sum_j m_j . d / r^3, with d = p_j - x,
+    r^2 = |d|^2 + eps^2 and m_j = a_j n_j.
     """
-    stack = np.empty(STACK, np.int64)
+    px, py, pz, mx, my, mz = source[0], source[1], source[2], source[3], source[4], source[5]
     for i in range(first, last):
         if eps[i] == 0.0:
-            out[i] = 0.0
             continue
         x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
         squared = eps[i] * eps[i]
         gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0
+        for j in range(count):
+            dx, dy, dz = px[j] - x, py[j] - y, pz[j] - z
+            inverse = 1.0 / (dx * dx + dy * dy + dz * dz + squared)
+            cube = inverse * np.sqrt(inverse)
+            along = (dx * mx[j] + dy * my[j] + dz * mz[j]) * cube
+            w += along
+            along *= 3.0 * inverse
+            gx += mx[j] * cube - along * dx
+            gy += my[j] * cube - along * dy
+            gz += mz[j] * cube - along * dz
+        out[i, 0] += gx
+        out[i, 1] += gy
+        out[i, 2] += gz
+        out[i, 3] += w
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _dipole_sums(  # type: ignore[no-untyped-def]
+    first, last, queries, themselves, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
+):
+    """Sum `_add` over all points, for groups of GROUP queries in a row: they share one walk down the tree.
+
+    A node is far where it is from every query of the group. Queries that are the points themselves leave themselves
+    out. Sources are collected, and added a list at a time.
+    """
+    stack = np.empty(STACK, np.int64)
+    source = np.empty((6, LIST))
+    own = np.empty((6, 1))
+    for group in range(first, last):
+        begin, end = group * GROUP, min((group + 1) * GROUP, len(queries))
+        x, y, z = 0.0, 0.0, 0.0
+        wanted = 0
+        for i in range(begin, end):
+            if eps[i] != 0.0:
+                x, y, z = x + queries[i, 0], y + queries[i, 1], z + queries[i, 2]
+                wanted += 1
+        if wanted == 0:
+            continue
+        x, y, z = x / wanted, y / wanted, z / wanted
+        reach = 0.0
+        for i in range(begin, end):
+            if eps[i] != 0.0:
+                dx, dy, dz = queries[i, 0] - x, queries[i, 1] - y, queries[i, 2] - z
+                reach = max(reach, dx * dx + dy * dy + dz * dz)
+        reach = opening * np.sqrt(reach)
+        count = 0
         stack[0] = 0
         top = 1
         while top > 0:
             top -= 1
             node = stack[top]
             dx, dy, dz = centre[node, 0] - x, centre[node, 1] - y, centre[node, 2] - z
-            r2 = dx * dx + dy * dy + dz * dz
-            if radius[node] * radius[node] < opening * opening * r2:
-                r2 += squared
-                cube = 1.0 / (r2 * np.sqrt(r2))
-                along = 3.0 * (dx * moments[node, 0] + dy * moments[node, 1] + dz * moments[node, 2]) * cube / r2
-                gx += moments[node, 0] * cube - along * dx
-                gy += moments[node, 1] * cube - along * dy
-                gz += moments[node, 2] * cube - along * dz
-                w += along * r2 / 3.0
+            least = radius[node] + reach
+            if least * least < opening * opening * (dx * dx + dy * dy + dz * dz):
+                if count == LIST:
+                    _add(count, source, queries, eps, begin, end, out)
+                    count = 0
+                for d in range(3):
+                    source[d, count] = centre[node, d]
+                    source[3 + d, count] = moments[node, d]
+                count += 1
             elif child[node] >= 0:
                 stack[top] = child[node]
                 stack[top + 1] = child[node] + 1
                 top += 2
             else:
                 for k in range(start[node], stop[node]):
-                    if own and k == i:
+                    # The group's own points follow below: each must leave out itself.
+                    if themselves and begin <= k < end:
                         continue
-                    dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
-                    r2 = dx * dx + dy * dy + dz * dz + squared
-                    cube = 1.0 / (r2 * np.sqrt(r2))
-                    along = 3.0 * (dx * dipoles[k, 0] + dy * dipoles[k, 1] + dz * dipoles[k, 2]) * cube / r2
-                    gx += dipoles[k, 0] * cube - along * dx
-                    gy += dipoles[k, 1] * cube - along * dy
-                    gz += dipoles[k, 2] * cube - along * dz
-                    w += along * r2 / 3.0
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = gx, gy, gz, w
+                    if count == LIST:
+                        _add(count, source, queries, eps, begin, end, out)
+                        count = 0
+                    for d in range(3):
+                        source[d, count] = points[k, d]
+                        source[3 + d, count] = dipoles[k, d]
+                    count += 1
+        _add(count, source, queries, eps, begin, end, out)
+        if not themselves:
+            continue
+        for k in range(begin, end):
+            for d in range(3):
+                own[d, 0] = points[k, d]
+                own[3 + d, 0] = dipoles[k, d]
+            _add(1, own, queries, eps, begin, k, out)
+            _add(1, own, queries, eps, k + 1, end, out)

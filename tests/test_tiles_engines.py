@@ -6,10 +6,15 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
+from face_plugin import FaceError, Params
 from face_plugin.meshers.delaunay import tetrahedralize
 from face_plugin.shapes import sphere
+from face_plugin.tiles import estimate_tiled
+from face_plugin.tiles.choose import make_engine
+from face_plugin.tiles.engines import Processes, Serial
 
 
 def test_gmsh_leaves_broken_pipes_to_python():
@@ -33,7 +38,7 @@ def _alive(pid):
 def test_processes_end_with_the_one_that_started_them():
     script = (
         "import time\n"
-        "from face_plugin.tiles.engines import Processes\n"
+        "from face_plugin.tiles.engines import Processes, Serial\n"
         "with Processes(2) as engine:\n"
         "    list(engine._pool.map(abs, range(4)))\n"
         "    print(*engine._pool._processes, flush=True)\n"
@@ -45,7 +50,68 @@ def test_processes_end_with_the_one_that_started_them():
     assert all(map(_alive, workers))
     os.kill(parent.pid, signal.SIGKILL)
     parent.wait()
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while any(map(_alive, workers)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(map(_alive, workers))
+
+
+def _die(folder, tile):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _fail(folder, tile):
+    raise ValueError(f"tile {tile}")
+
+
+def test_processes_that_die_again_and_again_end_the_run():
+    with Processes(2) as engine, pytest.raises(FaceError, match=r"died 3 times .*tile_points"):
+        engine.run(_die, "", [0, 1, 2], print)
+    with Processes(1) as engine, pytest.raises(ValueError, match=r"tile \d"):
+        engine.run(_fail, "", [0, 1, 2], print)
+
+
+def _whose(folder, tile):
+    with open(f"{folder}/{tile}", "w") as stream:
+        stream.write(str(os.getpid()))
+    return tile
+
+
+def test_this_process_takes_part(tmp_path):
+    done = []
+    with Processes(2, takes_part=True) as engine:
+        assert engine._pool._max_workers == 1
+        engine.run(_whose, str(tmp_path), [3, 4, 5, 6, 7], done.append)
+    assert sorted(done) == [3, 4, 5, 6, 7]
+    pids = [int((tmp_path / str(tile)).read_text()) for tile in done]
+    assert os.getpid() in pids
+    assert len(set(pids)) == 2
+
+
+def test_it_takes_part_where_there_is_a_tile_for_each():
+    params = Params(workers=2, max_memory=8.0)
+    assert make_engine("processes", params, 1000, 2000).takes_part
+    assert not make_engine("processes", params, 1000, 2001).takes_part
+    assert not Processes(1, takes_part=True).takes_part
+
+
+def test_two_tiles_are_the_same_here_and_there():
+    ball = sphere(2000).points
+    one, two = (estimate_tiled(ball, Params(tile_points=1000, engine=e, workers=2)) for e in ("serial", "processes"))
+    assert np.array_equal(one.normals, two.normals)
+    assert np.array_equal(one.confidence, two.confidence)
+
+
+def test_engines_by_name():
+    assert isinstance(make_engine("serial", Params(), 1000, 5000), Serial)
+    assert isinstance(make_engine(None, Params(engine="processes", workers=3), 1000, 5000), Processes)
+    assert make_engine("processes", Params(workers=8, max_memory=16.0), 1000, 3000).workers == 3
+    # 0.6 GB hold this process and one more.
+    assert make_engine("processes", Params(workers=8, max_memory=0.6), 1000, 9000).workers == 1
+    assert isinstance(make_engine("auto", Params(workers=1), 1000, 9000), Serial)
+    own = Serial()
+    assert make_engine(own, Params(), 1000, 5000) is own
+    with pytest.raises(ValueError, match="engine must be"):
+        make_engine("threads", Params(), 1000, 5000)
+    with pytest.raises(ValueError, match="engine must be"):
+        make_engine(3, Params(), 1000, 5000)

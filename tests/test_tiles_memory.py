@@ -38,5 +38,15 @@ def test_this_machine():
 def test_tiles_shrink_to_the_memory():
     assert fitting_tile_points(tile_memory(5_000), 20_000) == pytest.approx(5_000, abs=1)
     assert fitting_tile_points(1e12, 20_000) == 20_000
-    with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d\d GB, found 0\.25"):
+    with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d\d GB, found 0\.26"):
         fitting_tile_points(PROCESS_BYTES, 20_000)
+
+
+def test_small_tiles_are_mostly_halo():
+    def a_point(tile):
+        return (tile_memory(tile) - PROCESS_BYTES) / tile
+
+    # Measured: 57 kB a point in the worst of fourteen tiles of 3,000; 32 and 16 kB in one of 10,000 and of 50,000.
+    assert a_point(3_000) == pytest.approx(57e3, rel=0.1)
+    assert a_point(10_000) > 32e3
+    assert a_point(50_000) > 16e3

@@ -83,13 +83,15 @@ def make_engine(engine: EngineLike, params: Params, tile_points: int, count: int
     memory = allowed_memory(params)
     # This process holds no tile while others do, but it is there.
     fit = int((memory - PROCESS_BYTES) / tile_memory(tile_points))
-    workers = max(1, min(params.workers or usable_cores(), fit, -(-count // tile_points)))
+    tiles = -(-count // tile_points)
+    workers = max(1, min(params.workers or usable_cores(), fit, tiles))
     if chosen == "auto":
         chosen = "processes" if workers > 1 else "serial"
     if chosen == "serial":
         return Serial()
     if chosen == "processes":
-        return Processes(workers)
+        # With a tile for each, to start one process more would take longer than what it saves.
+        return Processes(workers, takes_part=tiles <= workers)
     if isinstance(chosen, str) and chosen != "dask" and "://" not in chosen:
         raise ValueError(
             "engine must be 'auto', 'serial', 'processes', 'dask' or an address such as 'tcp://host:8786', "

@@ -71,11 +71,15 @@ class Processes:
     Parameters
     ----------
     workers : int
-        Processes at a time.
+        Tiles at a time.
+    takes_part : bool
+        Whether this process solves tiles as well, so that one fewer has to start. It cannot be replaced if it
+        dies, and reports what others have done between its own tiles: good where there is about one each.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, *, takes_part: bool = False) -> None:
         self.workers = workers
+        self.takes_part = takes_part and workers > 1
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> Processes:
@@ -115,28 +119,33 @@ class Processes:
         assert self._pool is not None
         # A few more than there are workers: a broken pool then has little to repeat, and Ctrl-C little to
         # cancel.
+        most = self.workers - 1 if self.takes_part else self.workers + 1
         waiting, running = iter(list(left)), set[Future[int]]()
+
+        def finish(tile: int) -> None:
+            left.remove(tile)
+            done(tile)
+
         while True:
             with _without_main():
-                for tile in waiting:
+                while len(running) < most and (tile := next(waiting, None)) is not None:
                     running.add(self._pool.submit(job, folder, tile))
-                    if len(running) > self.workers:
-                        break
+            if self.takes_part and (tile := next(waiting, None)) is not None:
+                finish(job(folder, tile))
             if not running:
                 return
             finished, running = wait(running, return_when=FIRST_COMPLETED)
             for future in finished:
-                tile = future.result()
-                left.remove(tile)
-                done(tile)
+                finish(future.result())
 
     def _start(self) -> None:
+        count = max(1, self.workers - self.takes_part)
         self._pool = ProcessPoolExecutor(
-            self.workers, mp_context=multiprocessing.get_context("spawn"), initializer=_follow_parent
+            count, mp_context=multiprocessing.get_context("spawn"), initializer=_follow_parent
         )
-        # Interpreters load their libraries while this process prepares the tiles.
+        # Interpreters load their libraries and compiled code while this process prepares the tiles.
         with _without_main():
-            for _ in range(self.workers):
+            for _ in range(count):
                 self._pool.submit(_warm_up)
 
     def _stop(self) -> None:
@@ -158,11 +167,9 @@ def _follow_parent() -> None:
 
 
 def _warm_up() -> None:
-    from face_plugin.meshers import delaunay
-    from face_plugin.tiles import solve
+    from face_plugin.tiles.warm import warm_up
 
-    delaunay.gmsh_loads()
-    assert solve
+    warm_up()
 
 
 _main_lock = threading.Lock()

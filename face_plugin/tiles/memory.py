@@ -10,10 +10,11 @@ from face_plugin.params import SMALLEST_TILE
 __all__ = ["GIGABYTE", "available_memory", "fitting_tile_points", "tile_memory", "usable_cores"]
 
 GIGABYTE = 1e9
-# Measured (docs/scaling.md): an interpreter with this package loaded, and a point of a tile with its share
-# of halo.
-PROCESS_BYTES = 0.25e9
-POINT_BYTES = 15e3
+# Measured (docs/scaling.md): an interpreter with this package and a coarse level loaded, a point of a tile or of its
+# halo, and how much longer the halo makes the side of a tile, in spacings, where most sheets pass through it.
+PROCESS_BYTES = 0.26e9
+POINT_BYTES = 17.5e3
+HALO_SIDE = 44.0
 
 # Where the system does not tell.
 ASSUMED_BYTES = 8e9
@@ -53,8 +54,14 @@ def _container_memory(folder: Path) -> float:
 
 
 def tile_memory(points: float) -> float:
-    """Bytes that a process needs for a tile of so many points."""
-    return PROCESS_BYTES + POINT_BYTES * points
+    """Bytes that a process needs for a tile of so many points: the smaller it is, the more of it is halo.
+
+    Examples
+    --------
+    >>> 1.2 < tile_memory(40_000) / 1e9 < 1.4
+    True
+    """
+    return float(PROCESS_BYTES + POINT_BYTES * (points**0.5 + HALO_SIDE) ** 2)
 
 
 def fitting_tile_points(memory: float, wanted: int) -> int:
@@ -70,7 +77,8 @@ def fitting_tile_points(memory: float, wanted: int) -> int:
     >>> fitting_tile_points(8e9, 20_000)
     20000
     """
-    points = int((memory - PROCESS_BYTES) / POINT_BYTES)
+    side = (max(memory - PROCESS_BYTES, 0.0) / POINT_BYTES) ** 0.5 - HALO_SIDE
+    points = int(max(side, 0.0) ** 2)
     if points < SMALLEST_TILE:
         least = tile_memory(SMALLEST_TILE) / GIGABYTE
         raise ValueError(f"max_memory must be at least {least:.2f} GB, found {memory / GIGABYTE:.2f}")

@@ -44,10 +44,10 @@ def polish_tile(folder: str, tile: int) -> int:
 
 def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     seconds: list[float] = []
-    start = time.perf_counter()
+    start = time.process_time()
 
     def clock() -> None:
-        seconds.append(time.perf_counter() - start - sum(seconds))
+        seconds.append(time.process_time() - start - sum(seconds))
 
     seen = scene(store, tile)
     clock()

@@ -68,7 +68,7 @@ def fill_store(
     params : Params
         Kept with the store.
     tile_points : int
-        Number of points aimed at for a tile.
+        Number of points aimed at for a tile; as many tiles as that takes.
     interior : bool
         Whether the points are to be classified; kept with the store.
     key : str
@@ -95,7 +95,8 @@ def fill_store(
     del prepared
     progress(0.25)
     unit_sample = frame.to_unit(sample)
-    partition = split(unit_sample, max(1, round(source.count / tile_points)))
+    # Rounded up: a tile larger than asked for may not fit into the memory.
+    partition = split(unit_sample, max(1, -(-source.count // tile_points)))
     target = max(int(np.clip(source.count // COARSE_SHARE, *COARSE_POINTS)), source.count // MOST_A_COARSE)
     target = fitting_tile_points(memory, target)
     size = voxel_size(unit_sample, int(VOXELS_PER_POINT * target))

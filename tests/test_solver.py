@@ -77,7 +77,7 @@ def test_six_directions_and_all_of_them_give_the_same_normals():
 @pytest.mark.parametrize("seed", range(2))
 def test_cage_of_a_sphere_is_a_conducting_sphere(seed):
     """Outside of a ball in a uniform field E_max = 1 + 2 / r^3, where the field is along the radius."""
-    face = FaCE(shapes.sphere(1500, seed).points, Params(padding=10.0, cage_spacing=0.0))
+    face = FaCE(shapes.sphere(1500, seed).points, Params(padding=10.0, grading=0.8, cage_spacing=0.0))
     directions = np.random.default_rng(seed).normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     for r in (1.3, 1.5, 2.0, 3.0):

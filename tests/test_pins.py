@@ -122,7 +122,7 @@ def test_shielded_vertices_need_no_pin(solved):
 
 def test_a_cavity_filled_with_conductor_has_no_rim():
     # So dense that no tetrahedron reaches from the cavity into the wall, which 1,200 points do not ensure.
-    face = FaCE(shapes.spherical_shell(1500).points, Params(grading=0.8))
+    face = FaCE(shapes.spherical_shell(1500).points, Params(grading=0.8, cage_spacing=0.0))
     centre = face.frame.to_unit(np.zeros((1, 3)))
     free = face.poisson.free
     inside = free[np.linalg.norm(face.mesh.vertices[free] - centre, axis=1) * face.frame.scale < 0.52]
@@ -143,7 +143,7 @@ def test_pins_must_be_free_and_distinct(solved):
 
 
 def test_an_edit_solves_a_few_times_and_meshes_nothing(monkeypatch):
-    face = FaCE(shapes.spherical_shell(1500).points, dataclasses.replace(FIELD, grading=0.8))
+    face = FaCE(shapes.spherical_shell(1500).points, dataclasses.replace(FIELD, grading=0.8, cage_spacing=0.0))
     face.add_charges([[0.0, 0.0, 0.3]])  # what is computed once for all edits
     solves = []
     real = face.poisson.solve_free

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.sheets import bulk, ramp, sheet_reach
+from face_plugin.sheets import SHEET_NEIGHBOURS, Sheets, find_sheets, ramp
 
 __all__ = ["Balls", "build_balls", "local_spacing", "separation"]
 
@@ -22,8 +22,7 @@ COARSEST = 4.0
 WIDEST = 0.04
 # A sheet is where `bulk` is below these values, fully and not at all.
 SHEET = (0.02, 0.1)
-# Neighbours among which the next sheet is looked for, and among which the least favourable quarter decides.
-SHEET_NEIGHBOURS = 96
+# Neighbours among which the least favourable quarter decides.
 AROUND = 12
 FEWEST = 25
 
@@ -70,7 +69,9 @@ def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[n
     return np.asarray(distance[:, 1:].mean(axis=1))
 
 
-def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArray[np.float64]:
+def separation(
+    points: NDArray[np.float64], cage_spacing: float | None
+) -> tuple[NDArray[np.float64], Sheets | None]:
     """Smallest distance (n,) between balls at each point (n, 3), in the points' unit.
 
     Parameters
@@ -83,24 +84,30 @@ def separation(points: NDArray[np.float64], cage_spacing: float | None) -> NDArr
         sheets, 0.3 x the distance to the next one, at most 4 spacings and at most 0.04. A coarse cage bridges gaps
         as wide as its own spacing; and where nothing else is near, its side of the sheet is as right as a fine one's.
 
+    Returns
+    -------
+    separation : (n,) float64
+    sheets : Sheets or None
+        Of the points, where they were looked for.
+
     Examples
     --------
-    >>> separation(np.eye(3), 0.1)
+    >>> separation(np.eye(3), 0.1)[0]
     array([0.1, 0.1, 0.1])
     """
     if cage_spacing is not None:
-        return np.full(len(points), cage_spacing)
+        return np.full(len(points), cage_spacing), None
     if len(points) < FEWEST:
-        return np.zeros(len(points))
+        return np.zeros(len(points)), None
     distance, neighbour = cKDTree(points).query(points, k=min(SHEET_NEIGHBOURS + 1, len(points)), workers=-1)
-    spacing = distance[:, 1:7].mean(axis=1)
-    _, reach = sheet_reach(points, distance, neighbour, spacing)
+    sheets = find_sheets(points, distance, neighbour)
     # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.
     around = neighbour[:, : AROUND + 1]
-    reach = np.percentile(reach[around], 25.0, axis=1)
-    sheet = 1.0 - np.percentile(ramp(bulk(points, neighbour), SHEET)[around], 75.0, axis=1)
-    coarse = np.minimum(np.minimum(COARSENING * reach * sheet, COARSEST * spacing), WIDEST)
-    return np.asarray(np.maximum(THINNING * distance[:, 8], coarse))
+    reach = np.percentile(sheets.far[around], 25.0, axis=1)
+    on_sheet = 1.0 - np.percentile(ramp(sheets.bulk, SHEET)[around], 75.0, axis=1)
+    coarsest = np.minimum(COARSEST * distance[:, 1:7].mean(axis=1), WIDEST)
+    coarse = np.minimum(COARSENING * reach * on_sheet, coarsest)
+    return np.asarray(np.maximum(THINNING * distance[:, 8], coarse)), sheets
 
 
 def build_balls(

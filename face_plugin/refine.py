@@ -19,13 +19,11 @@ from scipy.spatial import cKDTree
 
 from face_plugin.fits import plane_fit, quadric_fits
 from face_plugin.normals import unit
-from face_plugin.sheets import back_to_back, bulk, ramp, sheet_reach
+from face_plugin.sheets import SHEET_NEIGHBOURS, Sheets, back_to_back, find_sheets, ramp
 from face_plugin.winding import DipoleTree
 
 __all__ = ["refine"]
 
-# Neighbours looked at: the widest kernel and the largest quadric follow from it.
-NEIGHBOURS = 96
 # Side: steps taken; kernel width as a fraction of the distance to the next sheet, and its bounds in spacings.
 SIDE_STEPS = 14
 # The side bears a coarser sum than the angle: about twice as fast, one to two degrees off.
@@ -66,6 +64,7 @@ def refine(
     normals: NDArray[np.float64],
     strength: NDArray[np.float64],
     moving: NDArray[np.bool_] | None = None,
+    sheets: Sheets | None = None,
 ) -> NDArray[np.float64]:
     """Refine rough outward normals by the points themselves.
 
@@ -79,6 +78,8 @@ def refine(
         E_max at the points.
     moving : (n,) bool, optional
         Which normals to refine; the others take part as they are. By default all.
+    sheets : Sheets, optional
+        Of the points, where they are known already.
 
     Returns
     -------
@@ -93,7 +94,7 @@ def refine(
     >>> bool(((refine(ball.points, rough, np.ones(500)) * ball.normals).sum(axis=1) > 0.99).all())
     True
     """
-    count = min(NEIGHBOURS + 1, len(points))
+    count = min(SHEET_NEIGHBOURS + 1, len(points))
     distance, neighbour = cKDTree(points).query(points, k=count, workers=-1)
     spacing = distance[:, 1:7].mean(axis=1)
     tree = DipoleTree(points, spacing**2)
@@ -101,7 +102,8 @@ def refine(
     still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
     rough = normals
 
-    normals = side = _sides(tree, normals, strength, distance, neighbour, spacing, plate | still)
+    sheets = sheets or find_sheets(points, distance, neighbour)
+    normals = side = _sides(tree, normals, strength, sheets, spacing, plate | still)
 
     # Where nothing is known and nothing moved, any direction will do for the fit.
     fitted, scatter = choose_quadric(points, unit(normals), neighbour, spacing)
@@ -124,25 +126,21 @@ def _sides(
     tree: DipoleTree,
     rough: NDArray[np.float64],
     strength: NDArray[np.float64],
-    distance: NDArray[np.float64],
-    neighbour: NDArray[np.intp],
+    sheets: Sheets,
     spacing: NDArray[np.float64],
     kept: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Turn stray normals (n, 3) round; those `kept` stay as they are."""
-    points = tree.points
-    shape = bulk(points, neighbour)
-    sheet = 1.0 - ramp(shape, SHEET)
+    flat = 1.0 - ramp(sheets.bulk, SHEET)
     low, high = SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing
-    near, far = sheet_reach(points, distance, neighbour, spacing)
-    narrow = np.clip(SIDE_WIDTH * near, low, high)
-    wide = np.maximum(SIDE_WIDTH * far, low)
-    vote = VOTE * ramp(shape, NO_SHEET) * ramp(np.log(np.maximum(strength, 1e-9)), np.log(STANDING_OUT))
+    narrow = np.clip(SIDE_WIDTH * sheets.near, low, high)
+    wide = np.maximum(SIDE_WIDTH * sheets.far, low)
+    vote = VOTE * ramp(sheets.bulk, NO_SHEET) * ramp(np.log(np.maximum(strength, 1e-9)), np.log(STANDING_OUT))
     vote = vote[:, None] * rough
     normals = rough
     for step in range(SIDE_STEPS):
         bound = WIDEST * (SIDE_BOUNDS[1] / WIDEST) ** (step / SIDE_STEPS)
-        width = narrow ** (1.0 - sheet) * np.minimum(wide, bound * spacing) ** sheet
+        width = narrow ** (1.0 - flat) * np.minimum(wide, bound * spacing) ** flat
         width[kept] = 0.0
         # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
         jump = tree.outward(normals, width, SIDE_OPENING) * (width / (2.0 * np.pi))[:, None]

@@ -115,7 +115,8 @@ class FaCE(Sculptable):
         # 2. A conducting ball at each point, near-duplicates left out.
         with self._stage("cage"):
             spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
-            rows = thin(self.cloud.points, cage.separation(self.cloud.points, spacing), params.seed)
+            separation, self._sheets = cage.separation(self.cloud.points, spacing)
+            rows = thin(self.cloud.points, separation, params.seed)
             self.balls = cage.build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
             )
@@ -160,7 +161,7 @@ class FaCE(Sculptable):
             if self.params.angles == "field":
                 return self._field_normals
             # 8. Stray sides turned round, and angles, from the points themselves.
-            return refine(self.cloud.points, self._votes, self._point_strength)
+            return refine(self.cloud.points, self._votes, self._point_strength, sheets=self._sheets)
 
     @cached_property
     def _votes(self) -> NDArray[np.float64]:

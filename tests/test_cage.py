@@ -58,24 +58,24 @@ def test_local_spacing_is_the_mean_distance_to_the_nearest():
 
 
 def test_separation():
-    np.testing.assert_array_equal(cage.separation(POINTS, 0.25), np.full(400, 0.25))
+    np.testing.assert_array_equal(cage.separation(POINTS, 0.25)[0], np.full(400, 0.25))
     eighth = np.sort(np.linalg.norm(POINTS[:, None] - POINTS, axis=2), axis=1)[:, 8]
     # Points in a volume are no sheet: only near-duplicates go.
-    np.testing.assert_allclose(cage.separation(POINTS, None), 0.35 * eighth)
+    np.testing.assert_allclose(cage.separation(POINTS, None)[0], 0.35 * eighth)
     # Too few to tell what is near: each carries a ball.
-    np.testing.assert_array_equal(cage.separation(POINTS[:8], None), 0.0)
+    np.testing.assert_array_equal(cage.separation(POINTS[:8], None)[0], 0.0)
 
 
 def test_the_cage_is_coarse_where_nothing_else_is_near_and_fine_where_a_wall_is_thin():
     sphere = shapes.sphere(20000, 0)
-    assert len(thin(sphere.points, cage.separation(sphere.points / 2, None) * 2, 0)) < 0.35 * 20000
+    assert len(thin(sphere.points, cage.separation(sphere.points / 2, None)[0] * 2, 0)) < 0.35 * 20000
     slab = shapes.slab(5000, 0, thickness=0.02)
-    assert len(thin(slab.points, cage.separation(slab.points, None), 0)) > 0.9 * 5000
+    assert len(thin(slab.points, cage.separation(slab.points, None)[0], 0)) > 0.9 * 5000
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_thinned_points_keep_their_distance_and_leave_no_gap(seed):
-    separation = cage.separation(POINTS, None)
+    separation = cage.separation(POINTS, None)[0]
     taken = thin(POINTS, separation, seed)
     assert (np.diff(taken) > 0).all()
     tree = cKDTree(POINTS[taken])
@@ -89,9 +89,9 @@ def test_thinned_points_keep_their_distance_and_leave_no_gap(seed):
 
 def test_thinning_removes_twins_and_keeps_an_even_sampling():
     lattice = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    assert len(thin(lattice, cage.separation(lattice, None), 0)) == len(lattice)
+    assert len(thin(lattice, cage.separation(lattice, None)[0], 0)) == len(lattice)
     twins = np.concatenate([lattice, lattice + 1e-3])
-    assert len(thin(twins, cage.separation(twins, None), 0)) == len(lattice)
+    assert len(thin(twins, cage.separation(twins, None)[0], 0)) == len(lattice)
 
 
 @pytest.mark.parametrize("separation", [0.0, 1e-12])

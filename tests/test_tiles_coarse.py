@@ -70,7 +70,7 @@ def test_the_error_of_the_transfer_decays_with_the_halo(tmp_path):
     def strength(part, around):
         level = solve_level(
             part.points,
-            separation(part.points, None),
+            separation(part.points, None)[0],
             params,
             box=Box(part.lower - part.spacing, part.upper + part.spacing),
             given=around.at,

@@ -84,7 +84,7 @@ class Params:
 
     # Large clouds
     tile_points: int | None = None
-    """Points of a tile, >= 1000; a cloud of no more is solved in one piece; None = tiles of 40,000 above 50,000."""
+    """Points of a tile, >= 1000; a cloud of no more is solved in one piece; None = tiles of 40,000 above 100,000."""
     max_memory: float | None = None
     """Memory that all processes together may take, in gigabytes (1e9 bytes); None = half of what is free."""
     engine: str = "auto"

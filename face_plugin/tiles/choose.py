@@ -22,7 +22,7 @@ __all__ = ["ONE_PIECE", "TILE_POINTS", "EngineLike", "in_tiles", "make_engine", 
 
 EngineLike: TypeAlias = "str | Engine | Client | None"
 
-ONE_PIECE = 50_000
+ONE_PIECE = 100_000
 """Points up to which a cloud is solved in one piece unless `Params.tile_points` says otherwise."""
 TILE_POINTS = 40_000
 """Points of a tile unless `Params.tile_points` says otherwise."""

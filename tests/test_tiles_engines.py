@@ -15,6 +15,7 @@ from face_plugin.shapes import sphere
 from face_plugin.tiles import estimate_tiled
 from face_plugin.tiles.choose import make_engine
 from face_plugin.tiles.engines import Processes, Serial
+from face_plugin.tiles.warm import warm_up
 
 
 def test_gmsh_leaves_broken_pipes_to_python():
@@ -115,3 +116,8 @@ def test_engines_by_name():
         make_engine("threads", Params(), 1000, 5000)
     with pytest.raises(ValueError, match="engine must be"):
         make_engine(3, Params(), 1000, 5000)
+
+
+def test_warming_up_takes_a_cloud_through_both_stages():
+    # What a process submits at its start fails silently there.
+    warm_up()

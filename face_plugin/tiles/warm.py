@@ -22,8 +22,8 @@ def warm_up() -> None:
     """Take a small cloud through both stages: libraries and compiled code are then in memory."""
     ball = normals.unit(np.random.default_rng(0).normal(size=(POINTS, 3)))
     with one_thread():
-        level = solve_level(ball, cage.separation(ball, None), Params())
+        level = solve_level(ball, cage.separation(ball, None)[0], Params())
         Locator(level.mesh).interpolate(ball, level.potential)
         strength = field.strength(level.mesh, level.potential, "exact")
         normals.field_normals(level.mesh, strength)
-        confidence(ball, ball, refine(ball, ball))
+        confidence(ball, ball, refine(ball, ball, np.ones(POINTS)))

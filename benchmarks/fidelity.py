@@ -3,7 +3,7 @@
     python benchmarks/fidelity.py
     python benchmarks/fidelity.py --inputs FOLDER --only 'clean*' --output out
 
-Every cloud is solved six times: with the package's defaults, with a plain Delaunay mesh around octahedra and icosahedra at every
+Every cloud is solved five times: with the package's defaults, with a plain Delaunay mesh around icosahedra at every
 point, with the paper's mesh (`Params.paper()`: TetGen), with the same and the icosahedra turned otherwise, which tells
 how far the paper's mesh agrees with itself, and with fTetWild's. Normals are the plain gradients of the field, and in
 the last column the refined ones, which are the package's default. Prints a table and whether the default agrees with
@@ -26,7 +26,6 @@ from face_plugin import FaCE, MeshingError, Params
 
 MESHERS = {
     "default": Params(angles="field"),
-    "octahedra": Params(mesher="delaunay", cage_spacing=0.0, angles="field"),
     "icosahedra": Params(mesher="delaunay", solid="icosahedron", cage_spacing=0.0, angles="field"),
     "paper": Params.paper(),
     "paper, turned": Params.paper(seed=1),

@@ -70,7 +70,7 @@ def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[n
 
 
 def separation(
-    points: NDArray[np.float64], cage_spacing: float | None
+    points: NDArray[np.float64], cage_spacing: float | None, *, coarsen: bool = True
 ) -> tuple[NDArray[np.float64], Sheets | None]:
     """Smallest distance (n,) between balls at each point (n, 3), in the points' unit.
 
@@ -83,6 +83,8 @@ def separation(
         0.35 x the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings; and, on
         sheets, 0.3 x the distance to the next one, at most 4 spacings and at most 0.04. A coarse cage bridges gaps
         as wide as its own spacing; and where nothing else is near, its side of the sheet is as right as a fine one's.
+    coarsen : bool
+        Whether None may do the second. The angles of a coarse cage's field are coarse as well.
 
     Returns
     -------
@@ -99,6 +101,8 @@ def separation(
         return np.full(len(points), cage_spacing), None
     if len(points) < FEWEST:
         return np.zeros(len(points)), None
+    if not coarsen:
+        return THINNING * cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0], None
     distance, neighbour = cKDTree(points).query(points, k=min(SHEET_NEIGHBOURS + 1, len(points)), workers=-1)
     sheets = find_sheets(points, distance, neighbour)
     # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.

@@ -50,7 +50,8 @@ class Params:
     """Solid that approximates a ball: 6 or 12 vertices."""
     cage_spacing: float | None = None
     """Smallest distance between two balls, in the unit of the input; 0 = a ball at every point; None = coarse on
-    sheets with nothing else near, fine where walls are thin, no near-duplicates: see `face_plugin.cage.separation`."""
+    sheets with nothing else near (not with angles="field"), fine where walls are thin, no near-duplicates: see
+    `face_plugin.cage.separation`."""
 
     # Domain and mesh
     padding: float = 0.1

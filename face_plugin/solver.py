@@ -115,7 +115,9 @@ class FaCE(Sculptable):
         # 2. A conducting ball at each point, near-duplicates left out.
         with self._stage("cage"):
             spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
-            separation, self._sheets = cage.separation(self.cloud.points, spacing)
+            separation, self._sheets = cage.separation(
+                self.cloud.points, spacing, coarsen=params.angles == "refined"
+            )
             rows = thin(self.cloud.points, separation, params.seed)
             self.balls = cage.build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed

@@ -69,6 +69,8 @@ def test_separation():
 def test_the_cage_is_coarse_where_nothing_else_is_near_and_fine_where_a_wall_is_thin():
     sphere = shapes.sphere(20000, 0)
     assert len(thin(sphere.points, cage.separation(sphere.points / 2, None)[0] * 2, 0)) < 0.35 * 20000
+    # The field's own angles need every ball.
+    assert len(thin(sphere.points, cage.separation(sphere.points / 2, None, coarsen=False)[0] * 2, 0)) == 20000
     slab = shapes.slab(5000, 0, thickness=0.02)
     assert len(thin(slab.points, cage.separation(slab.points, None)[0], 0)) > 0.9 * 5000
 

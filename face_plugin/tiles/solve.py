@@ -105,7 +105,8 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     coarse = _coarse(store.folder, store.key)
     part = surroundings(store, tile, HALO)
     given = params.cage_spacing
-    separation, _ = cage.separation(part.points, None if given is None else given / store.frame.scale)
+    spacing = None if given is None else given / store.frame.scale
+    separation, _ = cage.separation(part.points, spacing, coarsen=params.angles == "refined")
     clock("cage")
     level = solve_level(
         part.points,

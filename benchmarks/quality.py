@@ -60,7 +60,7 @@ def generated() -> Rows:
 
     import face_plugin
 
-    rows: Rows = {"this project": {}}
+    rows: Rows = {"face-plugin": {}}
     for name, make in GENERATED.items():
         shape = make(3000, 0)
         start = time.perf_counter()
@@ -69,7 +69,7 @@ def generated() -> Rows:
         cosine = np.clip((normals * shape.normals).sum(axis=1)[~shape.interior], -1, 1)
         angle = np.degrees(np.arccos(cosine))
         nothing = [float("nan")] * 4
-        rows["this project"][f"generated__{name}"] = [
+        rows["face-plugin"][f"generated__{name}"] = [
             100 * float((cosine > 0).mean()), float(angle.mean()), float(angle.std()), *nothing, seconds,
         ]  # fmt: skip
     return rows
@@ -100,7 +100,7 @@ def chart(table: dict[str, dict[str, dict[str, float]]], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    methods = sorted({m for row in table.values() for m in row}, key=lambda m: (m == "this project", m))
+    methods = sorted({m for row in table.values() for m in row}, key=lambda m: (m == "face-plugin", m))
     figure = Figure(figsize=(12, 7), layout="constrained")
     FigureCanvasAgg(figure)
     panels = (("align", "misaligned normals, %"), ("s_cd", "screened Poisson: mean squared distance"))
@@ -112,7 +112,8 @@ def chart(table: dict[str, dict[str, dict[str, float]]], path: Path) -> None:
             axes.bar(place, height, 0.8 / len(methods), label=method, color=f"C{k}")
         axes.set(xticks=range(len(table)), xticklabels=list(table), yscale="log", ylabel=label)
         axes.spines[["top", "right"]].set_visible(False)
-    figure.axes[0].legend(ncols=4, frameon=False, fontsize=8)
+    handles, labels = max((axes.get_legend_handles_labels() for axes in figure.axes), key=lambda found: len(found[1]))
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False, fontsize=8)
     figure.savefig(path, dpi=110)
 
 

@@ -24,7 +24,8 @@ WIDEST = 0.04
 SHEET = (0.02, 0.1)
 # Neighbours among which the least favourable quarter decides.
 AROUND = 12
-FEWEST = 25
+# Fewer points than this have no 8th neighbour.
+FEWEST = 9
 
 Solid = Literal["octahedron", "icosahedron"]
 
@@ -79,7 +80,7 @@ def separation(
     points : (n, 3) float64
         In the canonical frame, whose longest side is 1.
     cage_spacing : float or None
-        The same for all, in the points' unit. None = the larger of two, and 0 for fewer points than 25:
+        The same for all, in the points' unit. None = the larger of two, and 0 for fewer points than 9:
         0.35 x the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings; and, on
         sheets, 0.3 x the distance to the next one, at most 4 spacings and at most 0.04. A coarse cage bridges gaps
         as wide as its own spacing; and where nothing else is near, its side of the sheet is as right as a fine one's.

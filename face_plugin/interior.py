@@ -78,21 +78,25 @@ def enclosed(
     return found & (tree.number(outer, np.where(found, width, 0.0), step_outward) > STILL_ENCLOSED)
 
 
-def automatic_alpha(strength: NDArray[np.float64], is_enclosed: NDArray[np.bool_]) -> float:
+def automatic_alpha(strength: NDArray[np.float64]) -> float:
     """Threshold from the data: how strong the field is at the points that the others enclose.
 
     A leaking cage lets the field in, and what is inside shows it: alpha is the 90th percentile of E_max over the points
     that the others enclose, but at least the paper's 0.05 and at most 0.3.
 
+    Parameters
+    ----------
+    strength : (k,) float64
+        E_max at the points that the others enclose.
+
     Examples
     --------
-    >>> automatic_alpha(np.array([1.0, 0.1]), np.array([False, True]))
+    >>> automatic_alpha(np.array([0.1]))
     0.1
     """
-    deep = strength[is_enclosed]
-    if len(deep) == 0:
+    if len(strength) == 0:
         return ALPHA_BOUNDS[0]
-    return float(np.clip(np.percentile(deep, LEAK_PERCENTILE), *ALPHA_BOUNDS))
+    return float(np.clip(np.percentile(strength, LEAK_PERCENTILE), *ALPHA_BOUNDS))
 
 
 def shielded(

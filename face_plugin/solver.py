@@ -112,7 +112,7 @@ class FaCE(Sculptable):
         with self._stage("cloud"):
             self.cloud = cloud.prepare(points)
             self.frame = self.cloud.frame
-        # 2. A conducting ball at each point, near-duplicates left out.
+        # 2. Conducting balls at the points: near-duplicates left out, and points on sheets with nothing else near.
         with self._stage("cage"):
             spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
             separation, self._sheets = cage.separation(
@@ -228,7 +228,7 @@ class FaCE(Sculptable):
         """Alpha as a number and, where it is automatic, which points (m,) are enclosed, as those inside must be."""
         alpha = Params(alpha=alpha).alpha  # type: ignore[arg-type]
         if alpha == "auto":
-            return interior.automatic_alpha(self._point_strength, self._enclosed), self._enclosed
+            return interior.automatic_alpha(self._point_strength[self._enclosed]), self._enclosed
         return (ALPHAS[alpha] if isinstance(alpha, str) else alpha), None
 
     def result(self, *, filter_interior: bool = False) -> Result:

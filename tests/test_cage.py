@@ -64,6 +64,7 @@ def test_separation():
     np.testing.assert_allclose(cage.separation(POINTS, None)[0], 0.35 * eighth)
     # Too few to tell what is near: each carries a ball.
     np.testing.assert_array_equal(cage.separation(POINTS[:8], None)[0], 0.0)
+    assert (cage.separation(POINTS[:9], None)[0] > 0).all()
 
 
 def test_the_cage_is_coarse_where_nothing_else_is_near_and_fine_where_a_wall_is_thin():

@@ -255,8 +255,7 @@ def interior_alpha(store: Store) -> float:
         # What is not enclosed does not count, and need not be kept.
         deep = store.read(tile, "normals", "enclosed")["enclosed"]
         strength.append(store.read(tile, "field", "strength")["strength"][deep])
-    found = np.concatenate(strength)
-    return interior.automatic_alpha(found, np.ones(len(found), dtype=np.bool_))
+    return interior.automatic_alpha(np.concatenate(strength))
 
 
 def tile_seconds(store: Store) -> dict[str, float]:

@@ -19,15 +19,16 @@ from scipy.spatial import cKDTree
 from face_plugin.inside import inside
 from face_plugin.isosurface import fill_balls, isosurface
 from face_plugin.meshers import CageMesh
-from face_plugin.params import ALPHAS
 from face_plugin.winding import DipoleTree
 
 __all__ = ["automatic_alpha", "enclosed", "is_interior", "shielded"]
 
 # Winding numbers above which a point is enclosed by the others: at the point itself the paper's threshold (the surface
-# has 1/2, its concave edges 3/4), and a step outward that of the surface.
+# has 1/2, its concave edges 3/4); a step outward somewhat more than that of the surface; and there, with the points
+# left out of the sum back in, still more than nothing.
 ENCLOSED = 0.9
-STILL_ENCLOSED = 0.5
+STILL_ENCLOSED = 0.6
+BY_ALL = 0.35
 # Length of the step, in spacings: what lies less deep than about that counts as surface.
 STEP = 1.0
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
@@ -38,7 +39,7 @@ DARK = 1e-4
 PASSES = (0.6, 0.7, 0.8)
 # What is enclosed shows how far the field leaks in: alpha is this percentile of its strength, within the bounds.
 LEAK_PERCENTILE = 90.0
-ALPHA_BOUNDS = (ALPHAS["sparse"], 0.3)
+ALPHA_BOUNDS = (0.03, 0.3)
 
 
 def enclosed(
@@ -47,7 +48,8 @@ def enclosed(
     """Which points (n,) the others enclose: the winding number is near 1 there, and still high a step outward.
 
     What lies inside has no outward side and would blur the number. So it is computed again and again, each time without
-    the points in the dark that were enclosed the time before.
+    the points in the dark that were enclosed the time before. The walls of a deep cavity may be among these; a step
+    outward from them, by all points together, is outside.
 
     Parameters
     ----------
@@ -75,14 +77,16 @@ def enclosed(
         number = tree.number(outer, width)
     found = number > ENCLOSED
     step_outward = points + STEP * spacing[:, None] * normals
-    return found & (tree.number(outer, np.where(found, width, 0.0), step_outward) > STILL_ENCLOSED)
+    for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
+        found &= tree.number(dipoles, np.where(found, width, 0.0), step_outward) > level
+    return found
 
 
 def automatic_alpha(strength: NDArray[np.float64]) -> float:
     """Threshold from the data: how strong the field is at the points that the others enclose.
 
     A leaking cage lets the field in, and what is inside shows it: alpha is the 90th percentile of E_max over the points
-    that the others enclose, but at least the paper's 0.05 and at most 0.3.
+    that the others enclose, but at least 0.03, between the paper's two values, and at most 0.3.
 
     Parameters
     ----------

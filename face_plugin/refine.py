@@ -1,6 +1,6 @@
 """From the field's rough normals to accurate ones.
 
-E_max knows the side of nearly every point, but its gradient is accurate to ten degrees only. Two stages follow:
+E_max knows the side of nearly every point, but its gradient is accurate to ten degrees only. Three stages follow:
 
 1. **Side.** A few steps of n <- -grad w / |grad w|, the winding-number field of the oriented points, turn the stray
    points round. The kernel is as wide as the distance to the next sheet of the surface allows, so it bridges gaps
@@ -9,6 +9,7 @@ E_max knows the side of nearly every point, but its gradient is accurate to ten 
 2. **Angle.** Quadrics are fitted to more and more neighbours as long as the residual does not grow with them: it does
    where the surface is resolved (then the smallest fit is already too large, and narrow winding-number steps take
    over), and does not where points scatter about it.
+3. **Borders.** Where a sheet ends in the open, the field has a say in the angle as well.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from face_plugin.borders import bend_borders
 from face_plugin.fits import plane_fit, quadric_fits
 from face_plugin.normals import unit
 from face_plugin.sheets import SHEET_NEIGHBOURS, Sheets, back_to_back, find_sheets, ramp
@@ -119,6 +121,7 @@ def refine(
     normals = unit(normals + PLANE_WEIGHT * resolved * _along(plane, normals))
     settled = scatter[neighbour].mean(axis=1) > OVERRULE
     normals = np.where(settled[:, None], _along(normals, side), normals)
+    normals = bend_borders(points, normals, rough, strength, neighbour)
     return np.where(still[:, None], rough, normals)
 
 

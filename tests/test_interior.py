@@ -65,7 +65,7 @@ def test_both_inside_tests_say_the_same():
 
 
 def test_alpha_follows_the_leak_within_bounds():
-    assert automatic_alpha(np.empty(0)) == 0.05
+    assert automatic_alpha(np.empty(0)) == 0.03
     assert automatic_alpha(np.full(3, 0.2)) == pytest.approx(0.2)
     assert automatic_alpha(np.full(3, 0.9)) == 0.3
 

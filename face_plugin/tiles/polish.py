@@ -63,6 +63,6 @@ def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     if store.interior:
         found["enclosed"] = interior.enclosed(seen.points, normals, seen.strength)[seen.own]
     clock()
-    found["confidence"] = confidence(seen.points, votes, normals)[seen.own]
+    found["confidence"] = confidence(seen.points, votes, normals, seen.own)
     clock()
     return {**found, "seconds": np.array(seconds)}

@@ -24,9 +24,9 @@ from face_plugin.tiles.surroundings import surroundings
 __all__ = ["Scene", "scene", "write_far"]
 
 # Width of the full ring around a tile, in its spacings.
-WIDTH = 8.0
+WIDTH = 6.0
 # Width of the part of it in which normals move.
-NEAR = 4.0
+NEAR = 3.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
 SHARE = 0.2
 _SHEETS = tuple(field.name for field in fields(Sheets))

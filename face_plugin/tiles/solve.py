@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 # Width of the ring of neighbours' points around a tile, in local spacings: behind so many balls the field no
 # longer depends on the boundary data.
-HALO = 8.0
+HALO = 6.0
 # The smallest cell of free vertices that is aimed at, as a share of the largest that `Params.finest` allows,
 # and the numbers of cells along the box that are tried for it: with them some power of two is never far.
 FINEST_CELL = 0.65

@@ -35,7 +35,7 @@ SAME_LINE = 0.7
 
 
 def neighbourhoods(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Distances (n, k) to the points among which the next sheet is looked for, and their rows; the point itself first."""
+    """Distances (n, k) to the points among which the next sheet is looked for, and their rows; a point itself first."""
     found = cKDTree(points).query(points, k=min(SHEET_NEIGHBOURS + 1, len(points)), workers=-1)
     return np.asarray(found[0]), np.asarray(found[1])
 

@@ -121,7 +121,7 @@ def scene(store: Store, tile: int) -> Scene:
 
 
 def _of_tiles(store: Store, tile: NDArray[np.int64], row: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
-    """What the first stage found out about points, given by the tiles (n,) that own them and their rows there."""
+    """Read what the first stage found out about points, given by the tiles (n,) that own them and their rows there."""
     out: dict[str, NDArray[np.float64]] = {}
     for other in np.unique(tile):
         mine = tile == other

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from face_plugin.params import SMALLEST_TILE
 
-__all__ = ["GIGABYTE", "available_memory", "fitting_tile_points", "tile_memory", "usable_cores"]
+__all__ = ["GIGABYTE", "PROCESS_BYTES", "available_memory", "fitting_tile_points", "tile_memory", "usable_cores"]
 
 GIGABYTE = 1e9
 # Measured (docs/scaling.md): an interpreter with this package and a coarse level loaded, a point of a tile or of its

@@ -4,6 +4,7 @@ r"""Time by stage, memory and accuracy against the number of points, in one piec
     python benchmarks/scaling.py --sizes 20000 100000 200000 --tiled 20000 100000 200000 500000 1000000 2000000 \
         --workers 1 2 --each-up-to 200000 --output out
     python benchmarks/scaling.py --sizes 20000 100000 --tiled 20000 100000 --clean --add --output out
+    python benchmarks/scaling.py --from-file 1000000 --max-memory 0.4
 
 Every measurement runs in a process of its own. Figures go to scaling.json and a table, curves to scaling.png, and what
 follows for more points and machines is computed by `scaling_model.py` from scaling.json.
@@ -25,6 +26,7 @@ from typing import Any
 import numpy as np
 from clouds import teapot_with_box
 from numpy.typing import NDArray
+from plyfile import PlyData
 from scaling_report import compare, fits, plot, row
 
 SAMPLED_EVERY = 0.5
@@ -47,8 +49,13 @@ def main() -> None:
     parser.add_argument("--clean", action="store_true", help="leave out the points inside")
     parser.add_argument("--output", type=Path, default=Path("out"))
     parser.add_argument("--add", action="store_true", help="to the figures that scaling.json holds already")
+    parser.add_argument("--from-file", type=int, help="only this: `face normals` on a file of so many points")
+    parser.add_argument("--max-memory", type=float, default=0.4, help="GB that it may take")
     parser.add_argument("--measure", help=argparse.SUPPRESS)
     args = parser.parse_args()
+    if args.from_file:
+        print(from_file(args.from_file, args.max_memory))
+        return
     if args.measure:
         measure(**json.loads(args.measure))
         return
@@ -84,9 +91,13 @@ def write_cloud(path: Path, n: int, *, clean: bool) -> None:
 
 def in_a_process(job: dict[str, Any]) -> dict[str, Any]:
     """Run a measurement, and watch the memory of all its processes."""
-    child = subprocess.Popen(
-        [sys.executable, __file__, "--measure", json.dumps(job)], stdout=subprocess.PIPE, text=True
-    )
+    out, peaks = watched([sys.executable, __file__, "--measure", json.dumps(job)])
+    return {**json.loads(out.splitlines()[-1]), **peaks}
+
+
+def watched(command: list[str]) -> tuple[str, dict[str, float]]:
+    """Run a command; what it printed, and the peaks of the memory of all its processes."""
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     peaks = {"peak_gb": 0.0, "parent_gb": 0.0, "worker_gb": 0.0}
     stop = threading.Event()
 
@@ -102,8 +113,29 @@ def in_a_process(job: dict[str, Any]) -> dict[str, Any]:
     stop.set()
     watcher.join()
     if child.returncode:
-        raise SystemExit(f"measurement failed: {job}")
-    return {**json.loads(out.splitlines()[-1]), **peaks}
+        raise SystemExit(f"failed: {' '.join(command)}")
+    return out, peaks
+
+
+def from_file(n: int, max_memory: float) -> str:
+    """Run `face normals` from file to file on a cloud that need not fit into the memory allowed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_cloud(folder / "truth.npz", n, clean=False)
+        with np.load(folder / "truth.npz") as arrays:
+            np.save(folder / "big.npy", arrays["points"])
+        face = [sys.executable, "-m", "face_plugin.cli", "normals", str(folder / "big.npy")]
+        start = time.perf_counter()
+        _, peaks = watched([*face, "-o", str(folder / "big.ply"), "--max-memory", str(max_memory)])
+        seconds = time.perf_counter() - start
+        vertex = PlyData.read(str(folder / "big.ply"))["vertex"]
+        normals = np.stack([vertex[axis] for axis in ("nx", "ny", "nz")], axis=1)
+        with np.load(folder / "truth.npz") as arrays:
+            right = np.einsum("ij,ij->i", normals, arrays["normals"])[~arrays["interior"]] > 0
+    return (
+        f"{len(normals):,} points with --max-memory {max_memory}: {seconds:.0f} s, {peaks['peak_gb']:.2f} GB at the "
+        f"peak of all processes, {100 * right.mean():.3f} % on the right side"
+    )
 
 
 def family(pid: int) -> list[int]:

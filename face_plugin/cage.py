@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.sheets import SHEET_NEIGHBOURS, Sheets, find_sheets, ramp
+from face_plugin.sheets import Sheets, find_sheets, neighbourhoods, ramp
 
 __all__ = ["Balls", "build_balls", "local_spacing", "separation"]
 
@@ -104,7 +104,7 @@ def separation(
         return np.zeros(len(points)), None
     if not coarsen:
         return THINNING * cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0], None
-    distance, neighbour = cKDTree(points).query(points, k=min(SHEET_NEIGHBOURS + 1, len(points)), workers=-1)
+    distance, neighbour = neighbourhoods(points)
     sheets = find_sheets(points, distance, neighbour)
     # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.
     around = neighbour[:, : AROUND + 1]

@@ -12,9 +12,12 @@ __all__ = ["confidence"]
 
 
 def confidence(
-    points: NDArray[np.float64], field: NDArray[np.float64], normals: NDArray[np.float64]
+    points: NDArray[np.float64],
+    field: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    rows: NDArray[np.intp] | slice = slice(None),
 ) -> NDArray[np.float64]:
-    """Confidence (n,) in the side of each normal, in [0, 1].
+    """Confidence (k,) in the side of each normal, in [0, 1].
 
     The product of two figures that are both 1 on a clean, closed surface:
 
@@ -31,6 +34,8 @@ def confidence(
         Unit gradients of E_max.
     normals : (n, 3) float64
         Final unit normals.
+    rows : (k,) intp or slice
+        Points of which it is wanted; by default all.
 
     Examples
     --------
@@ -41,8 +46,10 @@ def confidence(
     """
     distance = cKDTree(points).query(points, k=min(7, len(points)), workers=-1)[0]
     spacing = distance[:, 1:].mean(axis=1)
-    outward = DipoleTree(points, spacing**2).outward(normals, spacing)
+    width = np.zeros(len(points))
+    width[rows] = spacing[rows]
+    outward = DipoleTree(points, spacing**2).outward(normals, width)[rows]
     # An infinite plane of dipoles has 4 pi |grad w| = 2 pi / eps with the kernel's width eps.
-    jump = np.einsum("nd,nd->n", outward, normals) * spacing / (2 * np.pi)
-    agreement = 0.5 * (1.0 + np.einsum("nd,nd->n", field, normals))
+    jump = np.einsum("nd,nd->n", outward, normals[rows]) * spacing[rows] / (2 * np.pi)
+    agreement = 0.5 * (1.0 + np.einsum("nd,nd->n", field[rows], normals[rows]))
     return np.asarray(np.clip(agreement, 0.0, 1.0) * np.clip(jump, 0.0, 1.0))

@@ -1,27 +1,29 @@
 """From the field's rough normals to accurate ones.
 
-E_max knows the side of nearly every point, but its gradient is accurate to ten degrees only. Three stages follow:
+E_max knows the side of nearly every point, but its gradient is accurate to ten degrees only. Four stages follow:
 
 1. **Side.** A few steps of n <- -grad w / |grad w|, the winding-number field of the oriented points, turn the stray
    points round. The kernel is as wide as the distance to the next sheet of the surface allows, so it bridges gaps
    and noise and does not reach across thin walls. Where there is no sheet, as in a bar thinner than the spacing, a
-   strong field keeps a vote.
+   strong field keeps a vote; in the dark of a closed body, where the field is noise, its vote is forgotten.
 2. **Angle.** Quadrics are fitted to more and more neighbours as long as the residual does not grow with them: it does
    where the surface is resolved (then the smallest fit is already too large, and narrow winding-number steps take
    over), and does not where points scatter about it.
 3. **Borders.** Where a sheet ends in the open, the field has a say in the angle as well.
+4. **Level.** Where the sampling is even and does not scatter, the surface that the normals describe together is made
+   to pass through the points.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.borders import bend_borders
 from face_plugin.fits import plane_fit, quadric_fits
+from face_plugin.levelling import level, level_weight
 from face_plugin.normals import unit
-from face_plugin.sheets import SHEET_NEIGHBOURS, Sheets, back_to_back, find_sheets, ramp
+from face_plugin.sheets import Sheets, back_to_back, find_sheets, neighbourhoods, ramp
 from face_plugin.winding import DipoleTree
 
 __all__ = ["refine"]
@@ -44,6 +46,12 @@ SHEET = (0.03, 0.1)
 VOTE = 0.5
 NO_SHEET = (0.1, 0.4)
 STANDING_OUT = (0.2, 2.0)
+# In the dark that leaks into a closed body, the votes are those of one mesh: with another seed some turn, and whole
+# patches follow. After this many steps, points with so little field where the winding number is near 1 lose what they
+# have and take the side of those around them. A cup is as dark at its bottom, but its wall is not enclosed.
+FORGET_AFTER = 4
+FORGET_DARK = 1e-6
+FORGET_ENCLOSED = 0.95
 # Angle: neighbours of the quadrics; a larger one is taken while its residual is below this multiple of the smallest's.
 QUADRICS = (12, 18, 30, 48)
 RESIDUAL_GROWTH = 1.35
@@ -84,7 +92,7 @@ def refine(
     moving : (n,) bool, optional
         Which normals to refine; the others take part as they are. By default all.
     sheets : Sheets, optional
-        Of the points, where they are known already.
+        Of the points, where they are known already; those of points that do not move are not looked at.
 
     Returns
     -------
@@ -99,8 +107,7 @@ def refine(
     >>> bool(((refine(ball.points, rough, np.ones(500)) * ball.normals).sum(axis=1) > 0.99).all())
     True
     """
-    count = min(SHEET_NEIGHBOURS + 1, len(points))
-    distance, neighbour = cKDTree(points).query(points, k=count, workers=-1)
+    distance, neighbour = neighbourhoods(points)
     spacing = distance[:, 1:7].mean(axis=1)
     tree = DipoleTree(points, spacing**2)
     plate = back_to_back(points, normals, neighbour, spacing)
@@ -111,10 +118,10 @@ def refine(
     normals = side = _sides(tree, normals, strength, sheets, spacing, neighbour, plate | still)
 
     # Where nothing is known and nothing moved, any direction will do for the fit.
-    fitted, scatter = choose_quadric(points, unit(normals), neighbour, spacing)
+    fitted, scatter, residual = choose_quadric(points, unit(normals), neighbour, spacing)
     scatter[plate] = 1.0
     width = np.sqrt(np.maximum((NEAREST * spacing) ** 2 - distance[:, 1] ** 2, (ANGLE_WIDTH * spacing) ** 2))
-    plane = plane_fit(points, distance, neighbour, min(PLANE[0], count - 1), PLANE[1])
+    plane = plane_fit(points, distance, neighbour, min(PLANE[0], len(points) - 1), PLANE[1])
     resolved = (1.0 - scatter)[:, None]
     fitted = scatter[:, None] * _along(fitted, normals)
     width[still] = 0.0
@@ -125,6 +132,7 @@ def refine(
     settled = scatter[neighbour].mean(axis=1) > OVERRULE
     normals = np.where(settled[:, None], _along(normals, side), normals)
     normals = bend_borders(points, normals, rough, strength, neighbour)
+    normals = level(tree, normals, neighbour, width, level_weight(distance, neighbour, scatter, residual))
     return np.where(still[:, None], rough, normals)
 
 
@@ -155,10 +163,14 @@ def _sides(
         width = narrow ** (1.0 - flat) * np.minimum(wide, bound * spacing) ** flat
         width[~turning] = 0.0
         # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
-        jump = tree.outward(normals, width, SIDE_OPENING) * (width / (2.0 * np.pi))[:, None]
+        outward, number = tree.outward_and_number(normals, width, SIDE_OPENING)
+        jump = outward * (width / (2.0 * np.pi))[:, None]
         turned = np.where(turning[:, None], unit(jump + vote), normals)
-        moved = np.einsum("nd,nd->n", turned, normals) < np.cos(SETTLED)
-        turning = moved[neighbour[:, : AROUND + 1]].any(axis=1) & ~kept
+        if step + 1 == FORGET_AFTER:
+            turned[~kept & (strength < FORGET_DARK) & (number > FORGET_ENCLOSED)] = 0.0
+        if step + 1 >= FORGET_AFTER:
+            moved = np.einsum("nd,nd->n", turned, normals) < np.cos(SETTLED)
+            turning = moved[neighbour[:, : AROUND + 1]].any(axis=1) & ~kept
         normals = turned
     return normals
 
@@ -173,17 +185,18 @@ def choose_quadric(
     normals: NDArray[np.float64],
     neighbour: NDArray[np.intp],
     spacing: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Find normals (n, 3) of the largest quadric that the neighbours bear, and how much (n,) they scatter, in [0, 1].
 
-    The residual of noise is the same at every size; that of curvature grows with it.
+    The residual of noise is the same at every size; that of curvature grows with it. The last array is the residual
+    (n,) of the smallest quadric, in spacings, as it is around each point.
     """
     counts = tuple(k for k in QUADRICS if k <= neighbour.shape[1])
     if len(counts) < 2:
-        return normals, np.zeros(len(points))
+        return normals, np.zeros(len(points)), np.zeros(len(points))
     fitted, residual = quadric_fits(points, normals, neighbour, spacing, counts)
     if not np.isfinite(residual[0]).any():
-        return normals, np.zeros(len(points))
+        return normals, np.zeros(len(points)), np.zeros(len(points))
     residual = np.where(np.isfinite(residual), residual, np.nanmedian(residual, axis=1, keepdims=True))
     typical = np.array([np.percentile(r[neighbour], RESIDUAL_PERCENTILE, axis=1) for r in residual])
     smallest = np.maximum(typical[0], 1e-12)
@@ -191,4 +204,4 @@ def choose_quadric(
     for s in range(1, len(counts)):
         chosen[(typical[s] < RESIDUAL_GROWTH * smallest) & (chosen == s - 1)] = s
     scatter = ramp(typical[0], SCATTER) * ramp(typical[1] / smallest, GROWTH)
-    return fitted[chosen, np.arange(len(points))], scatter
+    return fitted[chosen, np.arange(len(points))], scatter, typical[0]

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from face_plugin.fits import plane_fit
 from face_plugin.thinning import thin
 
-__all__ = ["Sheets", "back_to_back", "bulk", "find_sheets", "next_sheet", "ramp"]
+__all__ = ["Sheets", "back_to_back", "bulk", "find_sheets", "neighbourhoods", "next_sheet", "ramp"]
 
 # Neighbours among which the next sheet is looked for.
 SHEET_NEIGHBOURS = 96
@@ -32,6 +32,12 @@ PLATE_BEHIND = 0.9
 PLATE_PARALLEL = 0.85
 PLATE_MAJORITY = 0.4
 SAME_LINE = 0.7
+
+
+def neighbourhoods(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Distances (n, k) to the points among which the next sheet is looked for, and their rows; a point itself first."""
+    found = cKDTree(points).query(points, k=min(SHEET_NEIGHBOURS + 1, len(points)), workers=-1)
+    return np.asarray(found[0]), np.asarray(found[1])
 
 
 def bulk(points: NDArray[np.float64], neighbour: NDArray[np.intp]) -> NDArray[np.float64]:

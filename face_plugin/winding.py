@@ -75,6 +75,13 @@ class DipoleTree:
         """
         return self._evaluate(normals, eps, opening)[:, :3]
 
+    def outward_and_number(
+        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`outward` (n, 3) and `number` (n,) at the points, which cost no more together than one alone."""
+        columns = self._evaluate(normals, eps, opening)
+        return columns[:, :3], columns[:, 3] / (4.0 * np.pi)
+
     def number(
         self,
         normals: NDArray[np.float64],

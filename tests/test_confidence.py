@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from face_plugin import FaCE, shapes
+from face_plugin.confidence import confidence
 
 
 def test_confidence_is_high_on_a_clean_sphere_and_within_bounds():
@@ -23,3 +24,9 @@ def test_the_least_confident_points_are_wrong_most_often():
     # Measured: 1.9 times as often as anywhere, on this cup and on two others.
     least = np.argsort(result.confidence)[: len(wrong) // 3]
     assert wrong[least].mean() > 1.5 * wrong.mean()
+
+
+def test_confidence_of_some_points_is_that_among_all():
+    ball, rows = shapes.sphere(500, 0), np.array([3, 100, 77])
+    every = confidence(ball.points, ball.normals, ball.normals)
+    assert np.array_equal(confidence(ball.points, ball.normals, ball.normals, rows), every[rows])

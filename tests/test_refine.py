@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin import FaCE, shapes
+from face_plugin import FaCE, Params, shapes
 from face_plugin.normals import unit
 from face_plugin.refine import refine
 from face_plugin.sheets import back_to_back, bulk, next_sheet
@@ -94,6 +94,15 @@ def test_a_bar_thinner_than_the_spacing_keeps_the_fields_sides():
     # Without a field that stands out, the same points could as well be noise about a curve: their sides drift.
     drifted = refine(points, normals, np.full(len(points), 0.01))
     assert ((drifted * normals).sum(axis=1) > 0).mean() < 0.9
+
+
+@pytest.mark.slow
+def test_what_leaks_into_a_closed_body_does_not_decide():
+    # Where parts cross, their inner ends see a field of 1e-9 to 1e-6 that points otherwise in another mesh.
+    shape = shapes.demo_shape(12000, 0)
+    one, two = (FaCE(shape.points, Params(seed=seed)).normals() for seed in (0, 2))
+    # Measured: all; 99.4 % where these votes are kept.
+    assert ((one * two).sum(axis=1) > 0).mean() > 0.999
 
 
 def test_bulk_tells_bars_from_sheets():

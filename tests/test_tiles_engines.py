@@ -103,6 +103,27 @@ def test_two_tiles_are_the_same_here_and_there():
     assert np.array_equal(one.confidence, two.confidence)
 
 
+def test_a_process_is_copied_only_where_it_has_no_threads_of_others():
+    # In a process of its own: this one may have any threads.
+    script = (
+        "import threading, warnings\n"
+        "warnings.simplefilter('error')\n"
+        "import numpy as np\n"
+        "from face_plugin import Params\n"
+        "from face_plugin.shapes import sphere\n"
+        "from face_plugin.tiles import engines, estimate_tiled\n"
+        "ball = sphere(2000).points\n"
+        "one = estimate_tiled(ball, Params(tile_points=1000, engine='serial'))\n"
+        "for forks in (True, False):\n"
+        "    assert engines._may_fork() == forks\n"
+        "    two = estimate_tiled(ball, Params(tile_points=1000, engine='processes', workers=2))\n"
+        "    assert np.array_equal(one.normals, two.normals)\n"
+        "    assert np.array_equal(one.confidence, two.confidence)\n"
+        "    threading.Thread(target=threading.Event().wait, daemon=True).start()\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=120)
+
+
 def test_engines_by_name():
     assert isinstance(make_engine("serial", Params(), 1000, 5000), Serial)
     assert isinstance(make_engine(None, Params(engine="processes", workers=3), 1000, 5000), Processes)

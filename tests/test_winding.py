@@ -62,3 +62,11 @@ def test_number_is_a_half_on_the_surface_and_one_inside():
     w = DipoleTree(points, areas).number(normals, np.full(len(points), 0.03))
     assert np.median(w[:4000]) == pytest.approx(0.5, abs=0.03)
     np.testing.assert_allclose(w[4000:], 1, atol=0.02)
+
+
+def test_the_gradient_and_the_number_come_together(cloud):
+    points, normals, areas, eps = cloud
+    tree = DipoleTree(points, areas)
+    outward, number = tree.outward_and_number(normals, eps)
+    assert np.array_equal(outward, tree.outward(normals, eps))
+    assert np.array_equal(number, tree.number(normals, eps))

@@ -12,10 +12,11 @@ import multiprocessing
 import os
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import TracebackType
 from typing import Any, Protocol
 
@@ -140,11 +141,15 @@ class Processes:
 
     def _start(self) -> None:
         count = max(1, self.workers - self.takes_part)
+        # A copy of this process has all libraries at once, a new one loads them for a second.
+        forks = _may_fork()
         self._pool = ProcessPoolExecutor(
-            count, mp_context=multiprocessing.get_context("spawn"), initializer=_follow_parent
+            count,
+            mp_context=multiprocessing.get_context("fork" if forks else "spawn"),
+            initializer=_follow_parent,
         )
-        # Interpreters load their libraries and compiled code while this process prepares the tiles.
-        with _without_main():
+        # What is not loaded yet, they load while this process prepares the tiles.
+        with nullcontext() if forks else _without_main():
             for _ in range(count):
                 self._pool.submit(_warm_up)
 
@@ -152,6 +157,26 @@ class Processes:
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
+
+
+def _may_fork() -> bool:
+    """Whether copies of this process work: it has no threads but those of OpenBLAS, which ends them before a fork.
+
+    The threads of others would be missing in a copy, and what they held locked would stay so.
+    """
+    if sys.platform != "linux" or threading.active_count() > 1:
+        return False
+    try:
+        with warnings.catch_warnings():
+            # That there may be such threads is what a first copy, which ends at once, is to tell.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            copy = os.fork()
+        if copy == 0:
+            os._exit(0)
+        os.waitpid(copy, 0)
+        return len(os.listdir("/proc/self/task")) == 1
+    except OSError:
+        return False
 
 
 def _follow_parent() -> None:

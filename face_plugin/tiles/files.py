@@ -17,6 +17,7 @@ from face_plugin.io.cloudfile import replacing
 from face_plugin.params import Params
 from face_plugin.solver import Progress
 from face_plugin.tiles.choose import EngineLike, allowed_memory
+from face_plugin.tiles.memory import PROCESS_BYTES
 from face_plugin.tiles.run import collect, solve_store
 from face_plugin.tiles.sinks import WRITERS, Columns
 from face_plugin.tiles.sources import STREAMED, Source, open_source
@@ -65,7 +66,7 @@ def streams(source: Path, output: Path, params: Params) -> bool:
     """
     if source.suffix.lower() not in STREAMED or output.suffix.lower() not in STREAMED:
         return False
-    return open_source(source).count * HELD_BYTES > allowed_memory(params)
+    return open_source(source).count * HELD_BYTES + PROCESS_BYTES > allowed_memory(params)
 
 
 def normals_of_file(

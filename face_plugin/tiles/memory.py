@@ -7,14 +7,14 @@ from pathlib import Path
 
 from face_plugin.params import SMALLEST_TILE
 
-__all__ = ["GIGABYTE", "available_memory", "fitting_tile_points", "tile_memory", "usable_cores"]
+__all__ = ["GIGABYTE", "PROCESS_BYTES", "available_memory", "fitting_tile_points", "tile_memory", "usable_cores"]
 
 GIGABYTE = 1e9
 # Measured (docs/scaling.md): an interpreter with this package and a coarse level loaded, a point of a tile or of its
 # halo, and how much longer the halo makes the side of a tile, in spacings, where most sheets pass through it.
 PROCESS_BYTES = 0.26e9
 POINT_BYTES = 17.5e3
-HALO_SIDE = 44.0
+HALO_SIDE = 33.0
 
 # Where the system does not tell.
 ASSUMED_BYTES = 8e9
@@ -58,7 +58,7 @@ def tile_memory(points: float) -> float:
 
     Examples
     --------
-    >>> 1.2 < tile_memory(40_000) / 1e9 < 1.4
+    >>> 1.1 < tile_memory(40_000) / 1e9 < 1.3
     True
     """
     return float(PROCESS_BYTES + POINT_BYTES * (points**0.5 + HALO_SIDE) ** 2)

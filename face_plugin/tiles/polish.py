@@ -57,12 +57,12 @@ def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     if store.plane is not None:
         normals = np.tile(store.plane, (len(seen.points), 1))
     elif store.params.angles == "refined":
-        normals = refine(seen.points, votes, seen.strength, seen.near)
+        normals = refine(seen.points, votes, seen.strength, seen.near, seen.sheets)
     clock()
     found: dict[str, NDArray[np.generic]] = {"normals": normals[seen.own]}
     if store.interior:
         found["enclosed"] = interior.enclosed(seen.points, normals, seen.strength)[seen.own]
     clock()
-    found["confidence"] = confidence(seen.points, votes, normals)[seen.own]
+    found["confidence"] = confidence(seen.points, votes, normals, seen.own)
     clock()
     return {**found, "seconds": np.array(seconds)}

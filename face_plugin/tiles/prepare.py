@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 SAMPLE = (20_000, 1_000_000)
 SAMPLE_BYTES = 1_000
 # Points of the coarse cage: one in COARSE_SHARE, within these limits.
-COARSE_SHARE = 20
+COARSE_SHARE = 40
 COARSE_POINTS = (500, 6_000)
 # Beyond that many points for each of the coarse ones, these become more.
 MOST_A_COARSE = 500

@@ -7,7 +7,7 @@ level do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from face_plugin import cloud
 from face_plugin.normals import unit
+from face_plugin.sheets import Sheets
 from face_plugin.tiles.coarse import nearest_to_centres
 from face_plugin.tiles.store import Store
 from face_plugin.tiles.surroundings import surroundings
@@ -23,11 +24,12 @@ from face_plugin.tiles.surroundings import surroundings
 __all__ = ["Scene", "scene", "write_far"]
 
 # Width of the full ring around a tile, in its spacings.
-WIDTH = 8.0
+WIDTH = 6.0
 # Width of the part of it in which normals move.
-NEAR = 4.0
+NEAR = 3.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
 SHARE = 0.2
+_SHEETS = tuple(field.name for field in fields(Sheets))
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Scene:
     """(k,) the row of each point that the tile owns."""
     near: NDArray[np.bool_]
     """(n,) the tile's points, and those so near that their normals must be right for the tile's to be."""
+    sheets: Sheets | None
+    """Of the points `near`, 0 for others; None where the first stage did not look for them."""
 
 
 def write_far(store: Store) -> None:
@@ -90,23 +94,41 @@ def scene(store: Store, tile: int) -> Scene:
 
     tiles = np.concatenate([near.tile, middle.tile[rows]])
     row_in_tile = np.concatenate([near.row, middle.row[rows]])
-    normals = np.empty((len(tiles), 3))
-    strength = np.empty(len(tiles))
-    for other in np.unique(tiles):
-        mine = tiles == other
-        found = store.read(int(other), "field", "normals", "strength")
-        normals[mine] = found["normals"][row_in_tile[mine]]
-        strength[mine] = found["strength"][row_in_tile[mine]]
+    found = _of_tiles(store, tiles, row_in_tile)
     points = np.concatenate([near.points, middle.points[rows], far["points"][beyond]])
-    normals = np.concatenate([normals, far["normals"][beyond]])
-    strength = np.concatenate([strength, far["strength"][beyond]])
     order, leads = cloud.morton_distinct(points)
     place = np.empty(len(order), dtype=np.intp)
     place[order] = np.cumsum(leads) - 1
     kept = order[leads]
     moving = NEAR * near.spacing - reach
     inside = (points[kept] >= near.lower - moving) & (points[kept] <= near.upper + moving)
-    return Scene(points[kept], unit(normals[kept]), strength[kept], place[near.own], np.asarray(inside.all(axis=1)))
+    moves = np.asarray(inside.all(axis=1))
+
+    def everywhere(name: str) -> NDArray[np.float64]:
+        return np.concatenate([found[name], far[name][beyond]])[kept]
+
+    def where_it_moves(name: str) -> NDArray[np.float64]:
+        return np.where(moves, np.concatenate([found[name], np.zeros(len(beyond))])[kept], 0.0)
+
+    return Scene(
+        points[kept],
+        unit(everywhere("normals")),
+        everywhere("strength"),
+        place[near.own],
+        moves,
+        Sheets(*map(where_it_moves, _SHEETS)) if _SHEETS[0] in found else None,
+    )
+
+
+def _of_tiles(store: Store, tile: NDArray[np.int64], row: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
+    """Read what the first stage found out about points, given by the tiles (n,) that own them and their rows there."""
+    out: dict[str, NDArray[np.float64]] = {}
+    for other in np.unique(tile):
+        mine = tile == other
+        for name, values in store.read(int(other), "field").items():
+            if name in ("normals", "strength", *_SHEETS):
+                out.setdefault(name, np.empty((len(tile), *values.shape[1:])))[mine] = values[row[mine]]
+    return out
 
 
 def _thinned(points: NDArray[np.float64], distance: NDArray[np.float64], reach: float) -> NDArray[np.intp]:

@@ -20,6 +20,7 @@ from face_plugin.domain import Box
 from face_plugin.errors import MissingDependencyError, require
 from face_plugin.locate import Locator
 from face_plugin.params import Params
+from face_plugin.sheets import find_sheets, neighbourhoods
 from face_plugin.tiles.coarse import Coarse
 from face_plugin.tiles.level import solve_level
 from face_plugin.tiles.store import Store
@@ -31,7 +32,7 @@ log = logging.getLogger(__name__)
 
 # Width of the ring of neighbours' points around a tile, in local spacings: behind so many balls the field no
 # longer depends on the boundary data.
-HALO = 8.0
+HALO = 6.0
 # The smallest cell of free vertices that is aimed at, as a share of the largest that `Params.finest` allows,
 # and the numbers of cells along the box that are tried for it: with them some power of two is never far.
 FINEST_CELL = 0.65
@@ -106,7 +107,10 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     part = surroundings(store, tile, HALO)
     given = params.cage_spacing
     spacing = None if given is None else given / store.frame.scale
-    separation, _ = cage.separation(part.points, spacing, coarsen=params.angles == "refined")
+    refined = params.angles == "refined" and store.plane is None
+    separation, sheets = cage.separation(part.points, spacing, coarsen=params.angles == "refined")
+    if refined and sheets is None:
+        sheets = find_sheets(part.points, *neighbourhoods(part.points))
     clock("cage")
     level = solve_level(
         part.points,
@@ -122,6 +126,9 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     at_balls = normals.ball_means(level.mesh, strength)
     ball = cKDTree(level.balls.centres).query(own)[1]
     found = {"strength": at_balls[ball]}
+    if refined and sheets is not None:
+        # The second stage needs them as well, and to look for them is a fifth of all work.
+        found |= {name: values[part.own] for name, values in vars(sheets).items()}
     if store.interior:
         # Inside the isosurface of a level is where the field is below it, in the tile's box as everywhere.
         found["level"] = Locator(level.mesh).interpolate(own, strength)

@@ -12,7 +12,7 @@ from face_plugin.winding import DipoleTree
 __all__ = ["level", "level_weight"]
 
 STEPS = 3
-RATE = 1.2
+RATE = 1.4
 OPENING = 0.6
 # Area of a point of an even sampling, in squares of the mean distance to its 6 nearest.
 AREA = 0.85
@@ -23,10 +23,10 @@ FARTHEST = 0.35
 # is no reason to turn a normal. Nearest distance in spacings, mean of the 24 nearest: without an even sampling the
 # areas are not known. Residual of the quadric, in spacings: flat surfaces are level. Level itself, median of the 24
 # nearest: off where other parts cut in.
-SCATTERED = (0.03, 0.15)
+SCATTERED = (0.05, 0.2)
 EVEN = (0.65, 0.72)
-CURVED = (0.015, 0.04)
-LEVEL = (0.08, 0.14)
+CURVED = (0.02, 0.05)
+LEVEL = (0.1, 0.16)
 AROUND = 24
 
 

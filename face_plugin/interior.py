@@ -21,7 +21,7 @@ from face_plugin.isosurface import fill_balls, isosurface
 from face_plugin.meshers import CageMesh
 from face_plugin.winding import DipoleTree
 
-__all__ = ["automatic_alpha", "enclosed", "is_interior", "shielded"]
+__all__ = ["automatic_alpha", "enclosed", "shielded"]
 
 # Winding numbers above which a point is enclosed by the others: at the point itself the paper's threshold (the surface
 # has 1/2, its concave edges 3/4); a step outward somewhat more than that of the surface; and there, with the points
@@ -71,10 +71,13 @@ def enclosed(
     width = WIDTH * spacing
     outer = normals
     number = tree.number(outer, width)
+    left_out = np.zeros(len(points), dtype=np.bool_)
     for level in PASSES:
         inner = (strength < DARK) & (number > level)
-        outer = np.where(inner[:, None], 0.0, normals)
-        number = tree.number(outer, width)
+        if not np.array_equal(inner, left_out):
+            left_out = inner
+            outer = np.where(inner[:, None], 0.0, normals)
+            number = tree.number(outer, width)
     found = number > ENCLOSED
     step_outward = points + STEP * spacing[:, None] * normals
     for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
@@ -124,10 +127,3 @@ def shielded(
     """
     surface = isosurface(*fill_balls(mesh, strength), alpha)
     return inside(points, *surface, method=method)
-
-
-def is_interior(
-    is_shielded: NDArray[np.bool_], is_enclosed: NDArray[np.bool_] | None
-) -> NDArray[np.bool_]:
-    """Shielded, and, where that is known (``alpha="auto"``), enclosed by the other points."""
-    return is_shielded if is_enclosed is None else is_shielded & is_enclosed

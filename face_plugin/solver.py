@@ -219,10 +219,13 @@ class FaCE(Sculptable):
         """
         level, enclosed = self._threshold(self.params.alpha if alpha is None else alpha)
         with self._stage("interior"):
-            inside = interior.shielded(
-                self.mesh, self.vertex_strength, self.cloud.points, level, self.params.inside
-            )
-            return interior.is_interior(inside, enclosed)[self.cloud.rows]
+            inside = np.ones(len(self.cloud.points), dtype=np.bool_) if enclosed is None else enclosed.copy()
+            if inside.any():
+                candidates = self.cloud.points[inside]
+                inside[inside] = interior.shielded(
+                    self.mesh, self.vertex_strength, candidates, level, self.params.inside
+                )
+            return inside[self.cloud.rows]
 
     def _threshold(self, alpha: float | str) -> tuple[float, NDArray[np.bool_] | None]:
         """Alpha as a number and, where it is automatic, which points (m,) are enclosed, as those inside must be."""

@@ -240,8 +240,8 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         out["confidence"][row] = polished["confidence"]
         out["strength"][row] = solved["strength"]
         if store.interior:
-            enclosed = polished["enclosed"] if store.params.alpha == "auto" else None
-            out["interior"][row] = interior.is_interior(solved["level"] < alpha, enclosed)
+            inside = solved["level"] < alpha
+            out["interior"][row] = inside & polished["enclosed"] if store.params.alpha == "auto" else inside
     return out
 
 

@@ -12,10 +12,10 @@ from face_plugin.winding import DipoleTree
 __all__ = ["level", "level_weight"]
 
 STEPS = 3
-RATE = 1.4
+RATE = 1.45
 OPENING = 0.6
 # Area of a point of an even sampling, in squares of the mean distance to its 6 nearest.
-AREA = 0.85
+AREA = 0.87
 # A point off the level by more than FARTHEST is no sample of one surface, and by more than FAR is as one off by FAR.
 FAR = 0.25
 FARTHEST = 0.35
@@ -25,8 +25,8 @@ FARTHEST = 0.35
 # nearest: off where other parts cut in.
 SCATTERED = (0.05, 0.2)
 EVEN = (0.65, 0.72)
-CURVED = (0.02, 0.05)
-LEVEL = (0.1, 0.16)
+CURVED = (0.03, 0.07)
+LEVEL = (0.12, 0.18)
 AROUND = 24
 
 

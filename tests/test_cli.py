@@ -267,12 +267,17 @@ def test_a_failure_of_the_method(
     assert out.read_bytes() == b"what was there"
 
 
+def hear_interrupts() -> None:
+    """Undo what shells do to commands in the background, whose children inherit deaf ears."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, code: int) -> None:
     source, out = tmp_path / "in.npy", tmp_path / "out.ply"
     np.save(source, shapes.sphere(20_000).points)
     words = [sys.executable, "-m", "face_plugin.cli", "normals", str(source), "-o", str(out), "-v"]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts) as process:
         assert process.stderr is not None
         # The first stage has been timed: the computation is under way.
         seen = []
@@ -294,7 +299,8 @@ def test_an_interrupt_while_writing_leaves_the_old_file(tmp_path: Path) -> None:
         "import numpy, sys; from face_plugin.io import CloudFile, write_cloud; "
         "write_cloud(sys.argv[1], CloudFile(numpy.random.default_rng(0).random((2_000_000, 3))))"
     )
-    with subprocess.Popen([sys.executable, "-c", program, str(out)], stderr=subprocess.PIPE) as process:
+    words = [sys.executable, "-c", program, str(out)]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, preexec_fn=hear_interrupts) as process:
         while process.poll() is None and len(os.listdir(tmp_path)) == 1:
             time.sleep(0.005)
         process.send_signal(signal.SIGINT)

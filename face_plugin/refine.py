@@ -112,28 +112,27 @@ def refine(
     tree = DipoleTree(points, spacing**2)
     plate = back_to_back(points, normals, neighbour, spacing)
     still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
-    rough = normals
 
+    # 1. Stray points turned round.
     sheets = sheets or find_sheets(points, distance, neighbour)
-    normals = side = _sides(tree, normals, strength, sheets, spacing, neighbour, plate | still)
+    side = _sides(tree, normals, strength, sheets, spacing, neighbour, plate | still)
 
-    # Where nothing is known and nothing moved, any direction will do for the fit.
-    fitted, scatter, residual = choose_quadric(points, unit(normals), neighbour, spacing)
+    # 2. Angles. Where nothing is known and nothing moved, any direction will do for the fit.
+    fitted, scatter, residual = choose_quadric(points, unit(side), neighbour, spacing)
     scatter[plate] = 1.0
     width = np.sqrt(np.maximum((NEAREST * spacing) ** 2 - distance[:, 1] ** 2, (ANGLE_WIDTH * spacing) ** 2))
-    plane = plane_fit(points, distance, neighbour, min(PLANE[0], len(points) - 1), PLANE[1])
-    resolved = (1.0 - scatter)[:, None]
-    fitted = scatter[:, None] * _along(fitted, normals)
     width[still] = 0.0
-    for _ in range(ANGLE_STEPS):
-        narrow = unit(tree.outward(normals, width))
-        normals = np.where(still[:, None], rough, unit(resolved * narrow + fitted))
-    normals = unit(normals + PLANE_WEIGHT * resolved * _along(plane, normals))
+    plane = plane_fit(points, distance, neighbour, min(PLANE[0], len(points) - 1), PLANE[1])
+    refined = _angles(tree, side, fitted, plane, scatter, width)
     settled = scatter[neighbour].mean(axis=1) > OVERRULE
-    normals = np.where(settled[:, None], _along(normals, side), normals)
-    normals = bend_borders(points, normals, rough, strength, neighbour)
-    normals = level(tree, normals, neighbour, width, level_weight(distance, neighbour, scatter, residual))
-    return np.where(still[:, None], rough, normals)
+    refined = np.where(settled[:, None], _along(refined, side), refined)
+
+    # 3. Open borders.
+    refined = bend_borders(points, refined, normals, strength, neighbour)
+
+    # 4. Level.
+    refined = level(tree, refined, neighbour, width, level_weight(distance, neighbour, scatter, residual))
+    return np.where(still[:, None], normals, refined)
 
 
 def _sides(
@@ -173,6 +172,25 @@ def _sides(
             turning = moved[neighbour[:, : AROUND + 1]].any(axis=1) & ~kept
         normals = turned
     return normals
+
+
+def _angles(
+    tree: DipoleTree,
+    side: NDArray[np.float64],
+    fitted: NDArray[np.float64],
+    plane: NDArray[np.float64],
+    scatter: NDArray[np.float64],
+    width: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Turn normals (n, 3) of the right side to the angle that kernels this wide, and the fits, tell; 0: they stay."""
+    still = (width == 0.0)[:, None]
+    resolved = (1.0 - scatter)[:, None]
+    fitted = scatter[:, None] * _along(fitted, side)
+    normals = side
+    for _ in range(ANGLE_STEPS):
+        narrow = unit(tree.outward(normals, width))
+        normals = np.where(still, side, unit(resolved * narrow + fitted))
+    return unit(normals + PLANE_WEIGHT * resolved * _along(plane, normals))
 
 
 def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@ r"""Time by stage, memory and accuracy against the number of points, in one piec
 
     python benchmarks/scaling.py --sizes 1000 5000 20000 50000 100000 --output out
     python benchmarks/scaling.py --sizes 20000 100000 200000 --tiled 20000 100000 200000 500000 1000000 2000000 \
-        --workers 1 2 --each-up-to 200000 --output out
+        --workers 1 2 --each-up-to 100000 --output out
     python benchmarks/scaling.py --sizes 20000 100000 --tiled 20000 100000 --clean --add --output out
     python benchmarks/scaling.py --from-file 1000000 --max-memory 0.4
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.normals import unit
-from face_plugin.sheets import ramp
+from face_plugin.sheets import log_ramp, ramp
 
 __all__ = ["bend_borders"]
 
@@ -65,5 +65,5 @@ def bend_borders(
     off_centre = np.linalg.norm(inward, axis=1) / np.linalg.norm(offset, axis=2).mean(axis=1)
     over = -unit(inward)
     across = np.maximum(np.einsum("nd,nd->n", field_normals, over), 0.0)
-    is_open = ramp(off_centre, BORDER) * ramp(np.log(np.maximum(strength, 1e-9)), np.log(OPEN))
+    is_open = ramp(off_centre, BORDER) * log_ramp(strength, OPEN)
     return unit(normals + (BEND * is_open * across)[:, None] * over)

@@ -11,8 +11,10 @@ from face_plugin.winding import DipoleTree
 
 __all__ = ["level", "level_weight"]
 
+# Gradient steps, and their length: with more or longer ones angles get worse than the surface gets better.
 STEPS = 3
 RATE = 1.45
+# A small correction bears a coarse sum.
 OPENING = 0.6
 # Area of a point of an even sampling, in squares of the mean distance to its 6 nearest.
 AREA = 0.87
@@ -104,12 +106,12 @@ def level(
     True
     """
     for step in range(STEPS):
-        off = AREA * tree.outward_and_number(normals, width, OPENING)[1] - 0.5
+        off = AREA * tree.number(normals, width, opening=OPENING) - 0.5
         if step == 0:
             around = np.abs(off)[neighbour[:, : AROUND + 1]]
             weight = weight * (1.0 - ramp(np.median(around, axis=1), LEVEL)) * (width > 0)
             width = np.where(weight > 0, width, 0.0)
         charge = weight * np.where(np.abs(off) < FARTHEST, np.clip(off, -FAR, FAR), 0.0)
-        turn = [tree.outward_and_number(np.outer(charge, axis), width, OPENING)[1] for axis in np.eye(3)]
+        turn = [tree.number(np.outer(charge, axis), width, opening=OPENING) for axis in np.eye(3)]
         normals = unit(normals + RATE * AREA * weight[:, None] * np.stack(turn, axis=1))
     return normals

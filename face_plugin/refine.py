@@ -23,7 +23,7 @@ from face_plugin.borders import bend_borders
 from face_plugin.fits import plane_fit, quadric_fits
 from face_plugin.levelling import level, level_weight
 from face_plugin.normals import unit
-from face_plugin.sheets import Sheets, back_to_back, find_sheets, neighbourhoods, ramp
+from face_plugin.sheets import Sheets, back_to_back, find_sheets, log_ramp, neighbourhoods, ramp
 from face_plugin.winding import DipoleTree
 
 __all__ = ["refine"]
@@ -153,7 +153,7 @@ def _sides(
     low, high = SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing
     narrow = np.clip(SIDE_WIDTH * sheets.near, low, high)
     wide = np.maximum(SIDE_WIDTH * sheets.far, low)
-    vote = VOTE * ramp(sheets.bulk, NO_SHEET) * ramp(np.log(np.maximum(strength, 1e-9)), np.log(STANDING_OUT))
+    vote = VOTE * ramp(sheets.bulk, NO_SHEET) * log_ramp(strength, STANDING_OUT)
     vote = vote[:, None] * rough
     normals = rough
     turning = ~kept

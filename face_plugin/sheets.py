@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from face_plugin.fits import plane_fit
 from face_plugin.thinning import thin
 
-__all__ = ["Sheets", "back_to_back", "bulk", "find_sheets", "neighbourhoods", "next_sheet", "ramp"]
+__all__ = ["Sheets", "back_to_back", "bulk", "find_sheets", "log_ramp", "neighbourhoods", "next_sheet", "ramp"]
 
 # Neighbours among which the next sheet is looked for.
 SHEET_NEIGHBOURS = 96
@@ -169,3 +169,14 @@ def ramp(values: NDArray[np.float64], ends: Sequence[float] | NDArray[np.float64
     array([0.  , 0.25, 1.  ])
     """
     return np.asarray(np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0))
+
+
+def log_ramp(strength: NDArray[np.float64], ends: Sequence[float]) -> NDArray[np.float64]:
+    """0 at the first end, 1 at the second, linear between in the logarithm: for E_max, which spans many decades.
+
+    Examples
+    --------
+    >>> log_ramp(np.array([0.0, 1.0, 10.0]), (0.1, 10.0))
+    array([0. , 0.5, 1. ])
+    """
+    return ramp(np.log(np.maximum(strength, 1e-9)), np.log(ends))

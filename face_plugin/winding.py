@@ -87,6 +87,7 @@ class DipoleTree:
         normals: NDArray[np.float64],
         eps: NDArray[np.float64],
         positions: NDArray[np.float64] | None = None,
+        opening: float = OPENING,
     ) -> NDArray[np.float64]:
         """Winding number: about 1/2 at a point of the surface, 1 inside it and 0 outside.
 
@@ -97,12 +98,14 @@ class DipoleTree:
             Width of the kernel at each position; 0 where no value is wanted: the result is 0 there.
         positions : (k, 3) float64, optional
             By default the points themselves, each without its own dipole.
+        opening : float, in [0, 1)
+            As in `outward`.
 
         Returns
         -------
         (k,) float64
         """
-        return self._evaluate(normals, eps, OPENING, positions)[:, 3] / (4.0 * np.pi)
+        return self._evaluate(normals, eps, opening, positions)[:, 3] / (4.0 * np.pi)
 
     def _evaluate(
         self,

@@ -56,7 +56,7 @@ def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     normals = seen.normals
     if store.plane is not None:
         normals = np.tile(store.plane, (len(seen.points), 1))
-    elif store.params.angles == "refined":
+    elif store.refines:
         normals = refine(seen.points, votes, seen.strength, seen.near, seen.sheets)
     clock()
     found: dict[str, NDArray[np.generic]] = {"normals": normals[seen.own]}

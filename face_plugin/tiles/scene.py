@@ -47,7 +47,7 @@ class Scene:
     near: NDArray[np.bool_]
     """(n,) the tile's points, and those so near that their normals must be right for the tile's to be."""
     sheets: Sheets | None
-    """Of the points `near`, 0 for others; None where the first stage did not look for them."""
+    """Of the points `near`, 0 for others; None where normals are not refined."""
 
 
 def write_far(store: Store) -> None:
@@ -116,18 +116,18 @@ def scene(store: Store, tile: int) -> Scene:
         everywhere("strength"),
         place[near.own],
         moves,
-        Sheets(*map(where_it_moves, _SHEETS)) if _SHEETS[0] in found else None,
+        Sheets(*map(where_it_moves, _SHEETS)) if store.refines else None,
     )
 
 
 def _of_tiles(store: Store, tile: NDArray[np.int64], row: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
     """Read what the first stage found out about points, given by the tiles (n,) that own them and their rows there."""
+    names = ("normals", "strength", *(_SHEETS if store.refines else ()))
     out: dict[str, NDArray[np.float64]] = {}
     for other in np.unique(tile):
         mine = tile == other
-        for name, values in store.read(int(other), "field").items():
-            if name in ("normals", "strength", *_SHEETS):
-                out.setdefault(name, np.empty((len(tile), *values.shape[1:])))[mine] = values[row[mine]]
+        for name, values in store.read(int(other), "field", *names).items():
+            out.setdefault(name, np.empty((len(tile), *values.shape[1:])))[mine] = values[row[mine]]
     return out
 
 

@@ -107,10 +107,9 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     part = surroundings(store, tile, HALO)
     given = params.cage_spacing
     spacing = None if given is None else given / store.frame.scale
-    refined = params.angles == "refined" and store.plane is None
     separation, sheets = cage.separation(part.points, spacing, coarsen=params.angles == "refined")
-    if refined and sheets is None:
-        sheets = find_sheets(part.points, *neighbourhoods(part.points))
+    if store.refines:
+        sheets = sheets or find_sheets(part.points, *neighbourhoods(part.points))
     clock("cage")
     level = solve_level(
         part.points,
@@ -126,7 +125,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     at_balls = normals.ball_means(level.mesh, strength)
     ball = cKDTree(level.balls.centres).query(own)[1]
     found = {"strength": at_balls[ball]}
-    if refined and sheets is not None:
+    if store.refines and sheets is not None:
         # The second stage needs them as well, and to look for them is a fifth of all work.
         found |= {name: values[part.own] for name, values in vars(sheets).items()}
     if store.interior:

@@ -79,6 +79,11 @@ class Store:
         return len(self.start) - 1
 
     @property
+    def refines(self) -> bool:
+        """Whether normals are refined, for which the first stage leaves what it knows of the sheets."""
+        return self.params.angles == "refined" and self.plane is None
+
+    @property
     def count(self) -> int:
         """Number of points."""
         return int(self.start[-1])

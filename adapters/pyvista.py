@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from face_plugin.errors import MissingDependencyError, require
+from face_plugin.estimate import reconstruct
 from face_plugin.filters import Normals, PointSet
 from face_plugin.params import Params
-from face_plugin.solver import reconstruct
 
 __all__ = ["FaceAccessor", "register", "unregister"]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin import solver
+from face_plugin import estimate
 from face_plugin.errors import require
 from face_plugin.params import Params
 
@@ -26,7 +26,7 @@ def points_of(geometry: Any) -> NDArray[Any]:
     return np.asarray(getattr(geometry, "vertices", geometry))
 
 
-def estimate_normals(geometry: Any, params: Params | None = None, **options: Any) -> solver.Result:
+def estimate_normals(geometry: Any, params: Params | None = None, **options: Any) -> estimate.Result:
     """`face_plugin.estimate_normals` of a geometry, which stays as it is.
 
     Parameters
@@ -43,7 +43,7 @@ def estimate_normals(geometry: Any, params: Params | None = None, **options: Any
     >>> estimate_normals(trimesh.PointCloud(sphere(300).points)).normals.shape
     (300, 3)
     """
-    return solver.estimate_normals(points_of(geometry), params, **options)
+    return estimate.estimate_normals(points_of(geometry), params, **options)
 
 
 def reconstruct(geometry: Any, params: Params | None = None, **options: Any) -> Any:
@@ -70,7 +70,7 @@ def reconstruct(geometry: Any, params: Params | None = None, **options: Any) -> 
     True
     """
     trimesh = require("trimesh", extra="trimesh")
-    surface = solver.reconstruct(points_of(geometry), params, **options)
+    surface = estimate.reconstruct(points_of(geometry), params, **options)
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     if surface.densities is not None:
         mesh.vertex_attributes["densities"] = surface.densities

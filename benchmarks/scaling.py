@@ -124,7 +124,7 @@ def from_file(n: int, max_memory: float) -> str:
         write_cloud(folder / "truth.npz", n, clean=False)
         with np.load(folder / "truth.npz") as arrays:
             np.save(folder / "big.npy", arrays["points"])
-        face = [sys.executable, "-m", "face_plugin.cli", "normals", str(folder / "big.npy")]
+        face = [sys.executable, "-m", "face_plugin.app.cli", "normals", str(folder / "big.npy")]
         start = time.perf_counter()
         _, peaks = watched([*face, "-o", str(folder / "big.ply"), "--max-memory", str(max_memory)])
         seconds = time.perf_counter() - start
@@ -211,8 +211,8 @@ def solve_in_tiles(
 ) -> tuple[NDArray[np.float64], dict[str, float], NDArray[np.int64], dict[str, Any]]:
     """Solve in tiles as `estimate_normals` does, and tell as well which tile owns each point (n,)."""
     from face_plugin import Params
+    from face_plugin.io.sources import ArraySource
     from face_plugin.tiles.run import collect, solve_store, tile_seconds
-    from face_plugin.tiles.sources import ArraySource
 
     engine = "serial" if workers == 1 else "processes"
     params = Params(tile_points=tile_points, workers=workers, engine=engine)

@@ -25,9 +25,12 @@ from scipy.spatial.transform import Rotation
 from study_shapes import flask, spiral
 from truth import GENERATED, Array, Case, degrees, generated, score, table
 
-from face_plugin import FaCE, Params, cage, domain, field, normals, shapes
-from face_plugin.meshers.select import build_mesh
-from face_plugin.poisson import Poisson
+from face_plugin import FaCE, Params, shapes
+from face_plugin.faraday import domain, field, gradient
+from face_plugin.faraday.balls import SOLIDS
+from face_plugin.faraday.meshers.select import build_mesh
+from face_plugin.faraday.poisson import Poisson
+from face_plugin.geometry import local_spacing
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -53,7 +56,7 @@ def spread(count: int) -> Array:
 
 def at_points(face: FaCE, strength: Array) -> Array:
     """Return normals (n, 3) of the input from E_max at the vertices, with a ball at every point."""
-    return face.frame.unrotate(normals.field_normals(face.mesh, strength))[face.cloud.rows]
+    return face.frame.unrotate(gradient.field_normals(face.mesh, strength))[face.cloud.rows]
 
 
 def directions(points: int, output: Path) -> None:
@@ -97,8 +100,8 @@ def subdivided(solid: Array) -> Array:
 
 def balls(points: int, output: Path) -> None:
     """Call the stages one by one: the third shape is no parameter of the package."""
-    icosahedron = cage.SOLIDS["icosahedron"]
-    kinds = {"octahedron": cage.SOLIDS["octahedron"], "icosahedron": icosahedron, "subdivided": subdivided(icosahedron)}
+    icosahedron = SOLIDS["icosahedron"]
+    kinds = {"octahedron": SOLIDS["octahedron"], "icosahedron": icosahedron, "subdivided": subdivided(icosahedron)}
     rows, errors = [], {}
     for case in bodies(points):
         face = FaCE(case.points, EVERY_POINT)
@@ -109,10 +112,10 @@ def balls(points: int, output: Path) -> None:
             vertices = made.centres[:, None] + made.radii[:, None, None] * (solid @ turns.transpose(0, 2, 1))
             made = dataclasses.replace(made, vertices=vertices)
             box = domain.padded_box(made, EVERY_POINT.padding)
-            mesh = build_mesh(made, cage.local_spacing(made.centres), box, EVERY_POINT)
+            mesh = build_mesh(made, local_spacing(made.centres), box, EVERY_POINT)
             potential = Poisson(mesh).solve(mesh.vertices[mesh.boundary])
             strength = field.strength(mesh, potential, "exact")
-            found[kind] = face.frame.unrotate(normals.field_normals(mesh, strength))[face.cloud.rows]
+            found[kind] = face.frame.unrotate(gradient.field_normals(mesh, strength))[face.cloud.rows]
             errors.setdefault(kind, []).append(score(found[kind], case)[1])
             angle = degrees(found[kind], found["icosahedron"]) if "icosahedron" in found else np.full(1, np.nan)
             rows.append([case.name, kind, str(len(mesh.vertices)), *(f"{x:.2f}" for x in score(found[kind], case)),
@@ -173,7 +176,7 @@ def section(axes: Any, case: Case, found: Array, axis: int, width: float, title:
 
 def spiral_study(points: int, output: Path) -> None:
     case, wall = spiral(points)
-    spacing = float(np.median(cage.local_spacing(case.points)))
+    spacing = float(np.median(local_spacing(case.points)))
     settings = {"Delaunay, octahedra": EVERY_POINT, "the paper's mesh": PAPER_MESH}
     edges = np.linspace(wall.min(), wall.max(), 6)
     band = np.clip(np.digitize(wall, edges) - 1, 0, 4)
@@ -199,7 +202,7 @@ def shielded(points: int, output: Path) -> None:
     for column, count in enumerate((points // 4, points)):
         case = flask(count)
         inside = np.linalg.norm(case.points, axis=1) < 0.925
-        spacing = float(np.median(cage.local_spacing(case.points)))
+        spacing = float(np.median(local_spacing(case.points)))
         for line, (name, params) in enumerate(settings.items()):
             found = np.asarray(FaCE(case.points, params).normals(), dtype=np.float64)
             good = 100 * ((found * case.normals).sum(axis=1) > 0)

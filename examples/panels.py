@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from face_plugin.plot import Camera, render_mesh, render_points, save_figure
+from face_plugin.app.plot import Camera, render_mesh, render_points, save_figure
 
 
 def aligned(normals: Any, truth: Any) -> float:

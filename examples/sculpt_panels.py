@@ -9,7 +9,7 @@ import numpy as np
 from panels import aligned, save_panels
 from scipy.spatial import cKDTree
 
-from face_plugin.plot import Camera, render_mesh, render_points
+from face_plugin.app.plot import Camera, render_mesh, render_points
 from face_plugin.shapes import sphere
 from face_plugin.surface import poisson_reconstruction
 

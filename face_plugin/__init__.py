@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from face_plugin.errors import FaceError, MeshingError, MissingDependencyError
+    from face_plugin.estimate import estimate_normals, reconstruct
     from face_plugin.params import Params
-    from face_plugin.solver import FaCE, Result, Surface, estimate_normals, reconstruct
+    from face_plugin.result import Result, Surface
+    from face_plugin.solver import FaCE
 
 __version__ = "0.1.0"
 __all__ = [
@@ -38,10 +40,10 @@ _HOME = {
     "MeshingError": "errors",
     "MissingDependencyError": "errors",
     "Params": "params",
-    "Result": "solver",
-    "Surface": "solver",
-    "estimate_normals": "solver",
-    "reconstruct": "solver",
+    "Result": "result",
+    "Surface": "result",
+    "estimate_normals": "estimate",
+    "reconstruct": "estimate",
 }
 
 

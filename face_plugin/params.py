@@ -51,7 +51,7 @@ class Params:
     cage_spacing: float | None = None
     """Smallest distance between two balls, in the unit of the input; 0 = a ball at every point; None = coarse on
     sheets with nothing else near (not with angles="field"), fine where walls are thin, no near-duplicates: see
-    `face_plugin.cage.separation`."""
+    `face_plugin.sides.sheets.cage_separation`."""
 
     # Domain and mesh
     padding: float = 0.1

@@ -1,74 +1,37 @@
-"""The method, end to end: unoriented points in, outward normals and a surface out."""
+"""A solved cage that is kept: its field, normals and interior, and what is made of it by hand."""
 
 from __future__ import annotations
 
 import dataclasses
 import logging
-import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin import cage, cloud, domain, field, interior, normals
-from face_plugin.confidence import confidence
-from face_plugin.locate import Locator
-from face_plugin.meshers.select import build_mesh
+from face_plugin import cloud
+from face_plugin.faraday import domain, field, gradient
+from face_plugin.faraday.balls import build_balls
+from face_plugin.faraday.inside import shielded
+from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.meshers.select import build_mesh
+from face_plugin.faraday.poisson import Poisson
+from face_plugin.geometry import local_spacing, thin
 from face_plugin.params import ALPHAS, Params
-from face_plugin.poisson import Poisson
 from face_plugin.refine import refine
-from face_plugin.sculpt import Sculptable, SculptFile
-from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
-from face_plugin.thinning import thin
-from face_plugin.tiles.choose import EngineLike, in_tiles
+from face_plugin.result import Progress, Result
+from face_plugin.sculpt.sculptable import Sculptable
+from face_plugin.sides import enclosure
+from face_plugin.sides.confidence import confidence
+from face_plugin.sides.sheets import cage_separation
 
-__all__ = ["FaCE", "Progress", "Result", "Surface", "estimate_normals", "reconstruct"]
+__all__ = ["FaCE"]
 
 log = logging.getLogger(__name__)
-
-# Where the field is weaker, double precision leaves nothing of its direction.
-ROUNDING = 1e-9
-
-Progress = Callable[[str, float], None]
-"""Called with the name of a stage and 0.0 at its start, 1.0 at its end."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """What the method says of each input point, in the order of the input."""
-
-    normals: NDArray[np.floating]
-    """(n, 3) outward unit normals, in the input's floating-point type."""
-    strength: NDArray[np.floating]
-    """(n,) E_max at the point's ball; unshielded space has 1."""
-    confidence: NDArray[np.floating]
-    """(n,) confidence in the side of the normal, in [0, 1], as `face_plugin.confidence` defines it: the agreement of
-    field and points, times the jump of the winding number across the point."""
-    interior: NDArray[np.bool_] | None
-    """(n,) whether the point lies inside the object; None where it was not asked for."""
-    timings: dict[str, float]
-    """Seconds by stage."""
-    params: Params
-    """The settings as resolved."""
-
-
-@dataclass(frozen=True)
-class Surface:
-    """A reconstructed surface."""
-
-    vertices: NDArray[np.float64]
-    """(k, 3) in the unit of the input."""
-    faces: NDArray[np.int64]
-    """(f, 3) oriented outward."""
-    densities: NDArray[np.float64] | None
-    """(k,) sampling density at the vertices, where the host gives it."""
-    result: Result
-    """The normals, and the points kept, that it was made from."""
 
 
 class FaCE(Sculptable):
@@ -115,17 +78,17 @@ class FaCE(Sculptable):
         # 2. Conducting balls at the points: near-duplicates left out, and points on sheets with nothing else near.
         with self._stage("cage"):
             spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
-            separation, self._sheets = cage.separation(
+            separation, self._sheets = cage_separation(
                 self.cloud.points, spacing, coarsen=params.angles == "refined"
             )
             rows = thin(self.cloud.points, separation, params.seed)
-            self.balls = cage.build_balls(
+            self.balls = build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
             )
         # 3. A padded box.
         with self._stage("domain"):
             box = domain.padded_box(self.balls, params.padding, params.least_side)
-            local = cage.local_spacing(self.balls.centres)
+            local = local_spacing(self.balls.centres)
         # 4. Tetrahedra between the box and the balls, graded from these to it.
         with self._stage("mesh"):
             self.mesh = build_mesh(self.balls, local, box, params)
@@ -144,13 +107,13 @@ class FaCE(Sculptable):
     def _point_strength(self) -> NDArray[np.float64]:
         """E_max at the balls nearest to the distinct points (m,)."""
         ball = cKDTree(self.balls.centres).query(self.cloud.points, workers=-1)[1]
-        return np.asarray(normals.ball_means(self.mesh, self.vertex_strength)[ball])
+        return np.asarray(gradient.ball_means(self.mesh, self.vertex_strength)[ball])
 
     @cached_property
     def _field_normals(self) -> NDArray[np.float64]:
         """Gradient of the strength at the distinct points (m, 3), in the canonical frame."""
-        at_balls = normals.field_normals(self.mesh, self.vertex_strength)
-        return normals.carry(self.balls.centres, at_balls, self.cloud.points)
+        at_balls = gradient.field_normals(self.mesh, self.vertex_strength)
+        return gradient.carry(self.balls.centres, at_balls, self.cloud.points)
 
     @cached_property
     def _normals(self) -> NDArray[np.float64]:
@@ -168,12 +131,12 @@ class FaCE(Sculptable):
     @cached_property
     def _votes(self) -> NDArray[np.float64]:
         """Field normals (m, 3), zero where there is no field: its gradient there is rounding, and must not spread."""
-        return np.where((self._point_strength > ROUNDING)[:, None], self._field_normals, 0.0)
+        return np.where((self._point_strength > gradient.ROUNDING)[:, None], self._field_normals, 0.0)
 
     @cached_property
     def _enclosed(self) -> NDArray[np.bool_]:
         """Which distinct points (m,) the others enclose."""
-        return interior.enclosed(self.cloud.points, self._normals, self._point_strength)
+        return enclosure.enclosed(self.cloud.points, self._normals, self._point_strength)
 
     def normals(self) -> NDArray[np.floating]:
         """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
@@ -211,7 +174,7 @@ class FaCE(Sculptable):
         alpha : float or {"auto", "dense", "sparse"}, optional
             As in `Params.alpha`, which is the default. A number, or a name for the paper's 0.01 and 0.05: the points
             that this isosurface of E_max encloses (paper section 3.5). "auto": those of them that the other points
-            enclose as well, with alpha from the leak of the cage; see `face_plugin.interior`.
+            enclose as well, with alpha from the leak of the cage; see `face_plugin.sides.enclosure`.
 
         Returns
         -------
@@ -222,7 +185,7 @@ class FaCE(Sculptable):
             inside = np.ones(len(self.cloud.points), dtype=np.bool_) if enclosed is None else enclosed.copy()
             if inside.any():
                 candidates = self.cloud.points[inside]
-                inside[inside] = interior.shielded(
+                inside[inside] = shielded(
                     self.mesh, self.vertex_strength, candidates, level, self.params.inside
                 )
             return inside[self.cloud.rows]
@@ -231,7 +194,7 @@ class FaCE(Sculptable):
         """Alpha as a number and, where it is automatic, which points (m,) are enclosed, as those inside must be."""
         alpha = Params(alpha=alpha).alpha  # type: ignore[arg-type]
         if alpha == "auto":
-            return interior.automatic_alpha(self._point_strength[self._enclosed]), self._enclosed
+            return enclosure.automatic_alpha(self._point_strength[self._enclosed]), self._enclosed
         return (ALPHAS[alpha] if isinstance(alpha, str) else alpha), None
 
     def result(self, *, filter_interior: bool = False) -> Result:
@@ -259,123 +222,3 @@ class FaCE(Sculptable):
         self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
         log.debug("%s: %.3f s", name, self.timings[name])
         self._progress(name, 1.0)
-
-
-def estimate_normals(
-    points: ArrayLike,
-    params: Params | None = None,
-    *,
-    filter_interior: bool = False,
-    sculpt: SculptFile | str | os.PathLike[str] | None = None,
-    engine: EngineLike = None,
-    progress: Progress | None = None,
-) -> Result:
-    """Outward normals of an unoriented point cloud by Faraday cage estimation.
-
-    Large clouds are solved in tiles, as `Params.tile_points` says; see `face_plugin.tiles`.
-
-    Parameters
-    ----------
-    points : (n, 3) array_like of float or int, in any unit
-        At least four distinct points that do not lie on one line. Duplicates are allowed.
-    params : Params, optional
-    filter_interior : bool
-        Also classify the points as interior or not.
-    sculpt : SculptFile or path, optional
-        Charges and cage points to apply. The cloud is then solved in one piece, whatever its size.
-    engine : str, Engine or distributed.Client, optional
-        Who solves tiles; by default `Params.engine`.
-    progress : callable, optional
-        ``progress(stage, fraction)``.
-
-    Returns
-    -------
-    Result
-
-    Raises
-    ------
-    ValueError
-        Bad input; the message names the argument, what was found and what is allowed.
-    MeshingError
-        The space between the box and the balls could not be meshed.
-
-    Examples
-    --------
-    >>> from face_plugin.shapes import sphere
-    >>> ball = sphere(500)
-    >>> normals = estimate_normals(ball.points).normals
-    >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
-    True
-    """
-    array = cloud.as_points(points)
-    if sculpt is not None and not isinstance(sculpt, SculptFile):
-        # A bad file is said before the cage is solved.
-        sculpt = SculptFile.load(sculpt)
-    if sculpt is None and in_tiles(len(array), params or Params()):
-        from face_plugin.tiles.run import estimate_tiled
-
-        return estimate_tiled(
-            array, params, filter_interior=filter_interior, engine=engine, progress=progress
-        )
-    face = FaCE(array, params, progress=progress)
-    if sculpt is not None:
-        face = face.sculpted(sculpt)
-    return face.result(filter_interior=filter_interior)
-
-
-def reconstruct(
-    points: ArrayLike,
-    params: Params | None = None,
-    *,
-    screened: bool = True,
-    depth: int | None = 8,
-    filter_interior: bool = True,
-    backend: Backend | None = None,
-    trim: float = 0.0,
-    sculpt: SculptFile | str | os.PathLike[str] | None = None,
-    engine: EngineLike = None,
-    progress: Progress | None = None,
-) -> Surface:
-    """Reconstruct a closed surface: outward normals, interior points dropped, Poisson reconstruction.
-
-    Parameters
-    ----------
-    points, params, sculpt, engine, progress
-        As in `estimate_normals`.
-    screened : bool
-        Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
-    depth : int or None
-        Depth of the reconstruction's octree, 1 to 16; None: from the spacing of the points, at most 12.
-    filter_interior : bool
-        Leave out the points inside the object.
-    backend : {"open3d", "pymeshlab"}, optional
-        Host that reconstructs; by default whichever is installed.
-    trim : float
-        Fraction of the vertices to drop, those of lowest density. This opens the surface.
-
-    Returns
-    -------
-    Surface
-
-    Examples
-    --------
-    >>> from face_plugin.shapes import sphere
-    >>> surface = reconstruct(sphere(500).points, depth=5)
-    >>> surface.faces.shape[1]
-    3
-    """
-    backend = check_arguments(depth, backend, trim)
-    result = estimate_normals(
-        points, params, filter_interior=filter_interior, sculpt=sculpt, engine=engine, progress=progress
-    )
-    keep = slice(None) if result.interior is None else ~result.interior
-    array = cloud.as_points(points)
-    report = progress or (lambda stage, fraction: None)
-    report("surface", 0.0)
-    start = time.perf_counter()
-    vertices, faces, densities = poisson_reconstruction(
-        array[keep], result.normals[keep], depth=depth, screened=screened, backend=backend, trim=trim
-    )
-    timings = {**result.timings, "surface": time.perf_counter() - start}
-    report("surface", 1.0)
-    return Surface(vertices, faces, densities, dataclasses.replace(result, timings=timings))

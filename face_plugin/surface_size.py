@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.tiles.memory import GIGABYTE, available_memory
+from face_plugin.memory import GIGABYTE, available_memory
 
 __all__ = ["reconstruction_memory", "suggested_depth", "warn_if_too_large"]
 

@@ -10,14 +10,11 @@ It is 1 inside, 0 outside, and its gradient at the surface is the inward normal.
 
 from __future__ import annotations
 
-import itertools
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-
 import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from face_plugin.geometry import in_threads
 
 __all__ = ["DipoleTree"]
 
@@ -129,18 +126,6 @@ class DipoleTree:
 
         in_threads(run, -(-len(queries) // GROUP), 512 // GROUP)
         return out
-
-
-def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> None:
-    """Call ``run(slice)`` for pieces of `count` rows on all cores; a row is computed alone, so any split is equal.
-
-    A core gets at least `least` rows.
-    """
-    pieces = max(1, min(os.cpu_count() or 1, count // least))
-    bounds = np.linspace(0, count, 4 * pieces + 1).astype(int)
-    slices = [slice(a, b) for a, b in itertools.pairwise(bounds)]
-    with ThreadPoolExecutor(pieces) as pool:
-        list(pool.map(run, slices))
 
 
 @numba.njit(cache=True)

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from face_plugin.cloud import as_points
 from face_plugin.filters.tiled import Tiled
 from face_plugin.params import Params
-from face_plugin.solver import FaCE, Progress
-from face_plugin.tiles.choose import in_tiles
+from face_plugin.result import Progress
+from face_plugin.solver import FaCE
+from face_plugin.tiles.plan import in_tiles
 
 __all__ = ["Mesh", "PointSet"]
 

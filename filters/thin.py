@@ -10,8 +10,8 @@ import numpy as np
 
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
-from face_plugin.solver import Progress
-from face_plugin.thinning import thin
+from face_plugin.geometry import thin
+from face_plugin.result import Progress
 
 __all__ = ["Thin"]
 

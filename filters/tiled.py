@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from face_plugin.estimate import estimate_normals
 from face_plugin.params import Params
-from face_plugin.solver import Progress, Result, estimate_normals
+from face_plugin.result import Progress, Result
 
 __all__ = ["Tiled"]
 

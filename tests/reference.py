@@ -11,7 +11,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.meshers import CageMesh
+from face_plugin.faraday.meshers import CageMesh
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import pytest
 
 from face_plugin import Params, estimate_normals
 from face_plugin.adapters import pymeshlab as face
-from face_plugin.cli import main
+from face_plugin.app.cli import main
 from face_plugin.shapes import nested_box, torus
 
 ml = pytest.importorskip("pymeshlab")

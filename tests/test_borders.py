@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from face_plugin import reconstruct, shapes
-from face_plugin.borders import bend_borders
+from face_plugin.angles.borders import bend_borders
 from face_plugin.shapes.solids import cone
 
 

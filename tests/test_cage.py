@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
-from face_plugin import cage, shapes
-from face_plugin.thinning import thin
+from face_plugin import shapes
+from face_plugin.faraday.balls import SOLIDS, build_balls
+from face_plugin.geometry import local_spacing, thin
+from face_plugin.sides.sheets import cage_separation
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.random((400, 3)) * 10.0 ** RNG.uniform(-4, 0, (400, 1))
@@ -11,7 +13,7 @@ POINTS = RNG.random((400, 3)) * 10.0 ** RNG.uniform(-4, 0, (400, 1))
 
 @pytest.mark.parametrize(("solid", "count", "facets"), [("octahedron", 6, 8), ("icosahedron", 12, 20)])
 def test_solids_are_regular_and_on_the_unit_sphere(solid, count, facets):
-    vertices = cage.SOLIDS[solid]
+    vertices = SOLIDS[solid]
     assert vertices.shape == (count, 3)
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1.0)
     hull = ConvexHull(vertices)
@@ -24,7 +26,7 @@ def test_solids_are_regular_and_on_the_unit_sphere(solid, count, facets):
 @pytest.mark.parametrize("solid", ["octahedron", "icosahedron"])
 def test_vertices_lie_on_disjoint_spheres(solid):
     rows = np.arange(0, 400, 2)
-    balls = cage.build_balls(POINTS, rows, radius=0.45, solid=solid)
+    balls = build_balls(POINTS, rows, radius=0.45, solid=solid)
     np.testing.assert_array_equal(balls.points, rows)
     np.testing.assert_array_equal(balls.centres, POINTS[rows])
     nearest = cKDTree(POINTS[rows]).query(POINTS[rows], k=2)[0][:, 1]
@@ -38,8 +40,8 @@ def test_vertices_lie_on_disjoint_spheres(solid):
 
 def test_solids_are_turned_evenly_and_repeatably():
     points = np.stack(np.meshgrid(*3 * [np.arange(12.0)]), axis=-1).reshape(-1, 3)
-    balls = cage.build_balls(points, np.arange(len(points)))
-    again, other = (cage.build_balls(points, np.arange(len(points)), seed=seed) for seed in (0, 1))
+    balls = build_balls(points, np.arange(len(points)))
+    again, other = (build_balls(points, np.arange(len(points)), seed=seed) for seed in (0, 1))
     np.testing.assert_array_equal(again.vertices, balls.vertices)
     assert not np.array_equal(other.vertices, balls.vertices)
     turns = (balls.vertices[:, :3] - points[:, None]) / 0.45
@@ -52,33 +54,33 @@ def test_solids_are_turned_evenly_and_repeatably():
 
 def test_local_spacing_is_the_mean_distance_to_the_nearest():
     brute = np.sort(np.linalg.norm(POINTS[:, None] - POINTS, axis=2), axis=1)[:, 1:7].mean(axis=1)
-    np.testing.assert_allclose(cage.local_spacing(POINTS), brute)
+    np.testing.assert_allclose(local_spacing(POINTS), brute)
     corners = np.eye(3)
-    np.testing.assert_allclose(cage.local_spacing(corners, 6), 2**0.5)
+    np.testing.assert_allclose(local_spacing(corners, 6), 2**0.5)
 
 
 def test_separation():
-    np.testing.assert_array_equal(cage.separation(POINTS, 0.25)[0], np.full(400, 0.25))
+    np.testing.assert_array_equal(cage_separation(POINTS, 0.25)[0], np.full(400, 0.25))
     eighth = np.sort(np.linalg.norm(POINTS[:, None] - POINTS, axis=2), axis=1)[:, 8]
     # Points in a volume are no sheet: only near-duplicates go.
-    np.testing.assert_allclose(cage.separation(POINTS, None)[0], 0.35 * eighth)
+    np.testing.assert_allclose(cage_separation(POINTS, None)[0], 0.35 * eighth)
     # Too few to tell what is near: each carries a ball.
-    np.testing.assert_array_equal(cage.separation(POINTS[:8], None)[0], 0.0)
-    assert (cage.separation(POINTS[:9], None)[0] > 0).all()
+    np.testing.assert_array_equal(cage_separation(POINTS[:8], None)[0], 0.0)
+    assert (cage_separation(POINTS[:9], None)[0] > 0).all()
 
 
 def test_the_cage_is_coarse_where_nothing_else_is_near_and_fine_where_a_wall_is_thin():
     sphere = shapes.sphere(20000, 0)
-    assert len(thin(sphere.points, cage.separation(sphere.points / 2, None)[0] * 2, 0)) < 0.35 * 20000
+    assert len(thin(sphere.points, cage_separation(sphere.points / 2, None)[0] * 2, 0)) < 0.35 * 20000
     # The field's own angles need every ball.
-    assert len(thin(sphere.points, cage.separation(sphere.points / 2, None, coarsen=False)[0] * 2, 0)) == 20000
+    assert len(thin(sphere.points, cage_separation(sphere.points / 2, None, coarsen=False)[0] * 2, 0)) == 20000
     slab = shapes.slab(5000, 0, thickness=0.02)
-    assert len(thin(slab.points, cage.separation(slab.points, None)[0], 0)) > 0.9 * 5000
+    assert len(thin(slab.points, cage_separation(slab.points, None)[0], 0)) > 0.9 * 5000
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_thinned_points_keep_their_distance_and_leave_no_gap(seed):
-    separation = cage.separation(POINTS, None)[0]
+    separation = cage_separation(POINTS, None)[0]
     taken = thin(POINTS, separation, seed)
     assert (np.diff(taken) > 0).all()
     tree = cKDTree(POINTS[taken])
@@ -92,9 +94,9 @@ def test_thinned_points_keep_their_distance_and_leave_no_gap(seed):
 
 def test_thinning_removes_twins_and_keeps_an_even_sampling():
     lattice = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    assert len(thin(lattice, cage.separation(lattice, None)[0], 0)) == len(lattice)
+    assert len(thin(lattice, cage_separation(lattice, None)[0], 0)) == len(lattice)
     twins = np.concatenate([lattice, lattice + 1e-3])
-    assert len(thin(twins, cage.separation(twins, None)[0], 0)) == len(lattice)
+    assert len(thin(twins, cage_separation(twins, None)[0], 0)) == len(lattice)
 
 
 @pytest.mark.parametrize("separation", [0.0, 1e-12])
@@ -104,4 +106,4 @@ def test_no_separation_keeps_every_point(separation):
 
 def test_one_ball_alone_is_refused():
     with pytest.raises(ValueError, match="cage_spacing must leave at least 2 balls, found 1 for 400 points"):
-        cage.build_balls(POINTS, thin(POINTS, np.full(400, 10.0), 0))
+        build_balls(POINTS, thin(POINTS, np.full(400, 10.0), 0))

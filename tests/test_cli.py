@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from face_plugin import MeshingError, Params, shapes, solver
-from face_plugin.cli import build_parser, main
-from face_plugin.cli.options import params_of
+from face_plugin import MeshingError, Params, estimate, shapes
+from face_plugin.app.cli import build_parser, main
+from face_plugin.app.cli.options import params_of
 from face_plugin.io import CloudFile, read_cloud, write_cloud
 from face_plugin.params import CHOICES
 
@@ -107,7 +107,7 @@ def test_surface_options_reach_the_reconstruction(
 
 def test_json_is_all_there_is_on_stdout(ball: Path) -> None:
     words = ["normals", str(ball), "-o", str(ball.with_name("out.npy")), "--json", "--seed", "3"]
-    done = subprocess.run([sys.executable, "-m", "face_plugin.cli", *words], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-m", "face_plugin.app.cli", *words], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["command"] == "normals"
@@ -258,7 +258,7 @@ def test_a_failure_of_the_method(
     def fail(*_: object, **__: object) -> None:
         raise MeshingError("no tetrahedra")
 
-    monkeypatch.setattr(solver, "estimate_normals", fail)
+    monkeypatch.setattr(estimate, "estimate_normals", fail)
     out = ball.with_name("out.ply")
     out.write_bytes(b"what was there")
     code, _, err = run(capfd, "normals", ball, "-o", out)
@@ -276,7 +276,7 @@ def hear_interrupts() -> None:
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, code: int) -> None:
     source, out = tmp_path / "in.npy", tmp_path / "out.ply"
     np.save(source, shapes.sphere(20_000).points)
-    words = [sys.executable, "-m", "face_plugin.cli", "normals", str(source), "-o", str(out), "-v"]
+    words = [sys.executable, "-m", "face_plugin.app.cli", "normals", str(source), "-o", str(out), "-v"]
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts) as process:
         assert process.stderr is not None
         # The first stage has been timed: the computation is under way.

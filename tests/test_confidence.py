@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from face_plugin import FaCE, shapes
-from face_plugin.confidence import confidence
+from face_plugin.sides.confidence import confidence
 
 
 def test_confidence_is_high_on_a_clean_sphere_and_within_bounds():

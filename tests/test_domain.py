@@ -2,19 +2,22 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin import MeshingError, cage, domain, shapes
+from face_plugin import MeshingError, shapes
+from face_plugin.faraday import domain
+from face_plugin.faraday.balls import build_balls
+from face_plugin.geometry import local_spacing
 
 SETTINGS = {"grading": 0.8, "finest": 1.5, "seed": 0}
 
 
 def balls_of(points):
-    return cage.build_balls(points, np.arange(len(points)))
+    return build_balls(points, np.arange(len(points)))
 
 
 def filled(points, **changes):
     balls = balls_of(points)
     box = domain.padded_box(balls, 0.1)
-    return balls, box, domain.fill(balls, cage.local_spacing(points), box, **{**SETTINGS, **changes})
+    return balls, box, domain.fill(balls, local_spacing(points), box, **{**SETTINGS, **changes})
 
 
 CLOUDS = {
@@ -53,7 +56,7 @@ def test_free_vertices_lie_in_the_box_and_off_the_balls(name):
     assert ((filling.inner > box.lower) & (filling.inner < box.upper)).all()
     if len(filling.inner):
         distance, nearest = cKDTree(points).query(filling.inner)
-        assert (distance > 0.75 * cage.local_spacing(points)[nearest]).all()
+        assert (distance > 0.75 * local_spacing(points)[nearest]).all()
         assert (distance > balls.radii[nearest]).all()
 
 
@@ -70,7 +73,7 @@ def test_outer_vertices_lie_exactly_on_the_box_and_are_distinct(name):
 
 def test_cells_grow_with_the_distance_to_the_points():
     points = shapes.torus(3000).points
-    spacing = cage.local_spacing(points).mean()
+    spacing = local_spacing(points).mean()
     _, _, filling = filled(points)
     gap = cKDTree(filling.inner).query(filling.inner, k=2)[0][:, 1] / spacing
     away = cKDTree(points).query(filling.inner)[0] / spacing

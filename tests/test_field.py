@@ -4,8 +4,8 @@ import reference
 from scipy.spatial.transform import Rotation
 from tet_meshes import cage_mesh
 
-from face_plugin import field
-from face_plugin.meshers import CageMesh
+from face_plugin.faraday import field
+from face_plugin.faraday.meshers import CageMesh
 
 
 @pytest.fixture(scope="module")

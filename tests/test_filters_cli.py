@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from face_plugin.cli import main
+from face_plugin.app.cli import main
 from face_plugin.filters import Chain, Interior, Normals, PointSet, Surface, Thin
 from face_plugin.io import CloudFile, read_cloud, write_cloud
 from face_plugin.shapes import nested_box

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from face_plugin.fits import plane_fit, quadric_fits
+from face_plugin.angles.fits import quadric_fits
+from face_plugin.geometry import plane_fit
 
 
 def patch(height, count=400, seed=0):

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tet_meshes import cage_mesh, grid_mesh
 
-from face_plugin import inside as module
-from face_plugin.inside import inside, inside_by_rays, inside_by_winding
-from face_plugin.isosurface import fill_balls, isosurface
+from face_plugin.faraday import inside as module
+from face_plugin.faraday.inside import inside, inside_by_rays, inside_by_winding
+from face_plugin.faraday.isosurface import fill_balls, isosurface
 
 Points = NDArray[np.float64]
 Triangles = NDArray[np.int64]

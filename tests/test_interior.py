@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from face_plugin import FaCE, Params, shapes
-from face_plugin.cage import local_spacing
-from face_plugin.interior import automatic_alpha, enclosed
+from face_plugin.geometry import local_spacing
+from face_plugin.sides.enclosure import automatic_alpha, enclosed
 
 SOLIDS = {
     "box in a sphere": lambda: shapes.nested_box(4000, 0),

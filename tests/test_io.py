@@ -12,15 +12,7 @@ import plyfile
 import pytest
 import trimesh
 
-from face_plugin.io import (
-    CLOUD_SUFFIXES,
-    MESH_SUFFIXES,
-    CloudFile,
-    check_output,
-    read_cloud,
-    write_cloud,
-    write_mesh,
-)
+from face_plugin.io import CLOUD_SUFFIXES, MESH_SUFFIXES, CloudFile, check_output, read_cloud, write_cloud, write_mesh
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.normal(size=(7, 3))

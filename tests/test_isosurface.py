@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from tet_meshes import cage_mesh, enclosed_volume, grid_mesh, open_edges, tet_volumes, triangle_normals
 
-from face_plugin.isosurface import fill_balls, isosurface
-from face_plugin.meshers import CageMesh
+from face_plugin.faraday.isosurface import fill_balls, isosurface
+from face_plugin.faraday.meshers import CageMesh
 
 TURN = Rotation.from_euler("xyz", [0.3, 0.5, 0.7])
 

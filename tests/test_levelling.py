@@ -8,8 +8,8 @@ import reference
 from scipy.spatial import cKDTree
 
 from face_plugin import shapes
-from face_plugin.levelling import AREA, level, level_weight
-from face_plugin.normals import unit
+from face_plugin.angles.levelling import AREA, level, level_weight
+from face_plugin.geometry import unit
 from face_plugin.winding import DipoleTree
 
 

@@ -3,9 +3,9 @@ import pytest
 from tet_meshes import grid_mesh
 
 from face_plugin import FaCE, Params, shapes
-from face_plugin.locate import Locator
-from face_plugin.meshers import CageMesh
-from face_plugin.normals import ball_means
+from face_plugin.faraday.gradient import ball_means
+from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.meshers import CageMesh
 
 
 def in_the_box(mesh, count, seed=0):

@@ -5,8 +5,11 @@ import pytest
 from scipy.spatial import cKDTree
 from tet_meshes import tet_volumes
 
-from face_plugin import FaCE, MeshingError, Params, cage, domain, shapes
-from face_plugin.meshers.delaunay import delaunay_mesh, gmsh_loads, tetrahedralize
+from face_plugin import FaCE, MeshingError, Params, shapes
+from face_plugin.faraday import domain
+from face_plugin.faraday.balls import SOLIDS, build_balls
+from face_plugin.faraday.meshers.delaunay import delaunay_mesh, gmsh_loads, tetrahedralize
+from face_plugin.geometry import local_spacing
 
 RNG = np.random.default_rng(0)
 LATTICE = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
@@ -33,9 +36,9 @@ CLOUDS = {
 
 
 def meshed(points, solid="octahedron", library=None):
-    balls = cage.build_balls(points / np.ptp(points, axis=0).max(), np.arange(len(points)), solid=solid)
+    balls = build_balls(points / np.ptp(points, axis=0).max(), np.arange(len(points)), solid=solid)
     box = domain.padded_box(balls, 0.1)
-    filling = domain.fill(balls, cage.local_spacing(balls.centres), box, grading=0.8, finest=1.5, seed=0)
+    filling = domain.fill(balls, local_spacing(balls.centres), box, grading=0.8, finest=1.5, seed=0)
     return balls, box, delaunay_mesh(balls, filling, box, library)
 
 
@@ -82,7 +85,7 @@ def test_gmsh_and_scipy_agree_on_random_points():
 
 def test_repeated_calls_give_the_same_tetrahedra():
     """gmsh breaks ties with the C library's random numbers, unless it is kept from it."""
-    points = np.vstack([cage.SOLIDS["octahedron"] + centre for centre in 3 * LATTICE[:40]])
+    points = np.vstack([SOLIDS["octahedron"] + centre for centre in 3 * LATTICE[:40]])
     first = tetrahedralize(points)
     for _ in range(3):
         np.testing.assert_array_equal(tetrahedralize(points), first)
@@ -122,9 +125,9 @@ def test_state_of_gmsh_is_left_as_it_was():
 
 def test_balls_that_overlap_are_refused():
     points = shapes.sphere(50).points
-    balls = cage.build_balls(points, np.arange(50), radius=0.9)
+    balls = build_balls(points, np.arange(50), radius=0.9)
     box = domain.padded_box(balls, 0.1)
-    filling = domain.fill(balls, cage.local_spacing(points), box, grading=0.8, finest=1.5, seed=0)
+    filling = domain.fill(balls, local_spacing(points), box, grading=0.8, finest=1.5, seed=0)
     with pytest.raises(MeshingError, match="cut through"):
         delaunay_mesh(balls, filling, box)
 

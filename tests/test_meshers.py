@@ -13,21 +13,15 @@ import pytest
 from scipy.spatial import cKDTree
 from tet_meshes import tet_volumes
 
-from face_plugin import (
-    FaCE,
-    MeshingError,
-    MissingDependencyError,
-    Params,
-    cage,
-    domain,
-    estimate_normals,
-    shapes,
-)
-from face_plugin.meshers import delaunay, gate
-from face_plugin.meshers.native import run_native
-from face_plugin.meshers.select import build_mesh
-from face_plugin.meshers.surfaces import ball_volumes, boundary_surface, oriented
-from face_plugin.meshers.tetgen import tetgen_mesh
+from face_plugin import FaCE, MeshingError, MissingDependencyError, Params, estimate_normals, shapes
+from face_plugin.faraday import domain
+from face_plugin.faraday.balls import SOLIDS, build_balls
+from face_plugin.faraday.meshers import delaunay, gate
+from face_plugin.faraday.meshers.boundary import ball_volumes, boundary_surface, oriented
+from face_plugin.faraday.meshers.native import run_native
+from face_plugin.faraday.meshers.select import build_mesh
+from face_plugin.faraday.meshers.tetgen import tetgen_mesh
+from face_plugin.geometry import local_spacing
 
 BALL = shapes.sphere(150)
 CASES = {
@@ -42,8 +36,8 @@ CASES = {
 
 def caged(points, solid="octahedron", radius=0.45, padding=0.1):
     points = points / np.linalg.norm(np.ptp(points, axis=0))
-    balls = cage.build_balls(points, np.arange(len(points)), radius=radius, solid=solid)
-    return balls, cage.local_spacing(points), domain.padded_box(balls, padding)
+    balls = build_balls(points, np.arange(len(points)), radius=radius, solid=solid)
+    return balls, local_spacing(points), domain.padded_box(balls, padding)
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -353,7 +347,7 @@ def test_native_meshers_work_from_a_script_without_a_guard(tmp_path):
 
 
 def test_surface_turns_out_of_the_domain():
-    for solid in cage.SOLIDS:
+    for solid in SOLIDS:
         balls, _, box = caged(BALL.points[:20], solid)
         surface = boundary_surface(balls, box)
         a, b, c = (surface.vertices[column] for column in surface.faces.T)

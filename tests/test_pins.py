@@ -6,11 +6,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from face_plugin import FaCE, FaceError, Params, pins, shapes
-from face_plugin.field import strength, vertex_gradients
-from face_plugin.normals import carry, field_normals
-from face_plugin.pins import PinnedPoisson, rim
-from face_plugin.poisson import Poisson
+from face_plugin import FaCE, FaceError, Params, shapes
+from face_plugin.faraday.field import strength, vertex_gradients
+from face_plugin.faraday.gradient import carry, field_normals
+from face_plugin.faraday.poisson import Poisson
+from face_plugin.sculpt import pins
+from face_plugin.sculpt.pins import PinnedPoisson, rim
 
 FIELD = Params(angles="field")
 

@@ -10,15 +10,8 @@ import pytest
 import trimesh
 from matplotlib.figure import Figure
 
-from face_plugin.plot import (
-    Camera,
-    plot_interior,
-    plot_result,
-    render_mesh,
-    render_points,
-    save_figure,
-)
-from face_plugin.plot.section import Section
+from face_plugin.app.plot import Camera, plot_interior, plot_result, render_mesh, render_points, save_figure
+from face_plugin.app.plot.section import Section
 
 BALL = trimesh.creation.icosphere(subdivisions=4)
 VERTICES, FACES = np.asarray(BALL.vertices), np.asarray(BALL.faces)

@@ -8,18 +8,21 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 from tet_meshes import cage_mesh, grid_mesh, tet_volumes
 
-from face_plugin import MissingDependencyError, cage, domain, field
-from face_plugin.meshers import CageMesh
-from face_plugin.meshers.delaunay import delaunay_mesh
-from face_plugin.poisson import Poisson
+from face_plugin import MissingDependencyError
+from face_plugin.faraday import domain, field
+from face_plugin.faraday.balls import build_balls
+from face_plugin.faraday.meshers import CageMesh
+from face_plugin.faraday.meshers.delaunay import delaunay_mesh
+from face_plugin.faraday.poisson import Poisson
+from face_plugin.geometry import local_spacing
 
 
 def small_mesh(count=9, seed=0):
     """Mesh as the method makes it, small enough for dense matrices."""
     points = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 3))
-    balls = cage.build_balls(points, np.arange(count))
+    balls = build_balls(points, np.arange(count))
     box = domain.padded_box(balls, 0.1)
-    filling = domain.fill(balls, cage.local_spacing(points), box, grading=1.5, finest=3.0, seed=0)
+    filling = domain.fill(balls, local_spacing(points), box, grading=1.5, finest=3.0, seed=0)
     return delaunay_mesh(balls, filling, box)
 
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, Params, shapes
-from face_plugin.normals import unit
+from face_plugin.geometry import unit
 from face_plugin.refine import refine
-from face_plugin.sheets import back_to_back, bulk, next_sheet
+from face_plugin.sides.sheets import back_to_back, bulk, next_sheet
 
 
 def rough(normals: np.ndarray, flipped: float, seed: int = 0) -> np.ndarray:

@@ -4,19 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin.cli import main
+from face_plugin.app.cli import main
+from face_plugin.estimate import estimate_normals
 from face_plugin.io import read_cloud, write_mesh
-from face_plugin.ribbons import (
-    Samples,
-    Stroke,
-    normals_at_vertices,
-    ribbons,
-    sample,
-    sparsify,
-    teapot_sketch,
-)
+from face_plugin.ribbons import Samples, Stroke, normals_at_vertices, ribbons, sample, sparsify, teapot_sketch
 from face_plugin.ribbons.generator import teapot_solids
-from face_plugin.solver import estimate_normals
 
 
 def test_ribbons_sweep_the_brush():

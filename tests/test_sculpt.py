@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from face_plugin import FaCE, Params, shapes
 from face_plugin.cloud import Cloud
 from face_plugin.sculpt import SculptFile
-from face_plugin.sculptfile import CagePoint
+from face_plugin.sculpt.file import CagePoint
 from face_plugin.shapes import Shape
 
 FIELD = Params(angles="field")

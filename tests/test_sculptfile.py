@@ -12,7 +12,7 @@ from PIL import Image
 
 from face_plugin import FaCE, estimate_normals, reconstruct, shapes
 from face_plugin.sculpt import SculptFile
-from face_plugin.sculptfile import CagePoint
+from face_plugin.sculpt.file import CagePoint
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -13,6 +13,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, Params, estimate_normals
+from face_plugin.io.sources import ArraySource
 from face_plugin.shapes import demo_shape, sphere
 from face_plugin.tiles import estimate_tiled, in_tiles
 from face_plugin.tiles.coarse import solve_coarse
@@ -22,7 +23,6 @@ from face_plugin.tiles.prepare import fill_store
 from face_plugin.tiles.run import collect, solve_store
 from face_plugin.tiles.scene import write_far
 from face_plugin.tiles.solve import HALO, solve_tile
-from face_plugin.tiles.sources import ArraySource
 from face_plugin.tiles.surroundings import surroundings
 
 PARAMS = Params(tile_points=1000, engine="serial")

@@ -14,7 +14,7 @@ from face_plugin.io import CloudFile, read_cloud, write_cloud
 from face_plugin.shapes import sphere
 from face_plugin.tiles.files import work_folder
 
-FACE = [sys.executable, "-m", "face_plugin.cli"]
+FACE = [sys.executable, "-m", "face_plugin.app.cli"]
 TILES = ["--tile-points", "1000", "--workers", "2"]
 
 

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin import Params, field
-from face_plugin.cage import separation
-from face_plugin.domain import Box
-from face_plugin.locate import Locator
-from face_plugin.normals import ball_means
-from face_plugin.poisson import Poisson
+from face_plugin import Params
+from face_plugin.faraday import field
+from face_plugin.faraday.domain import Box
+from face_plugin.faraday.gradient import ball_means
+from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.poisson import Poisson
+from face_plugin.faraday.solve import solve_level
+from face_plugin.io.sources import ArraySource
 from face_plugin.shapes import demo_shape, sphere
+from face_plugin.sides.sheets import cage_separation
 from face_plugin.tiles.coarse import Coarse, Voxels, solve_coarse, voxel_size
-from face_plugin.tiles.level import solve_level
 from face_plugin.tiles.prepare import fill_store
 from face_plugin.tiles.solve import HALO
-from face_plugin.tiles.sources import ArraySource
 from face_plugin.tiles.surroundings import surroundings
 
 RNG = np.random.default_rng(1)
@@ -70,7 +71,7 @@ def test_the_error_of_the_transfer_decays_with_the_halo(tmp_path):
     def strength(part, around):
         level = solve_level(
             part.points,
-            separation(part.points, None)[0],
+            cage_separation(part.points, None)[0],
             params,
             box=Box(part.lower - part.spacing, part.upper + part.spacing),
             given=around.at,

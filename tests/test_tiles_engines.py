@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from face_plugin import FaceError, Params
-from face_plugin.meshers.delaunay import tetrahedralize
+from face_plugin.faraday.meshers.delaunay import tetrahedralize
 from face_plugin.shapes import sphere
 from face_plugin.tiles import estimate_tiled
-from face_plugin.tiles.choose import make_engine
 from face_plugin.tiles.engines import Processes, Serial
+from face_plugin.tiles.plan import make_engine
 from face_plugin.tiles.warm import warm_up
 
 

@@ -5,12 +5,12 @@ import pytest
 
 from face_plugin import Params, estimate_normals
 from face_plugin.io import CloudFile, read_cloud, write_cloud
+from face_plugin.io.sinks import WRITERS
+from face_plugin.io.sources import ArraySource, open_source
 from face_plugin.shapes import sphere
 from face_plugin.tiles.engines import Serial
 from face_plugin.tiles.files import columns_of, normals_of_file, streams, work_folder
 from face_plugin.tiles.prepare import fill_store
-from face_plugin.tiles.sinks import WRITERS
-from face_plugin.tiles.sources import ArraySource, open_source
 
 PARAMS = Params(tile_points=1250, engine="serial")
 COUNT = 2500

@@ -2,15 +2,8 @@
 
 import pytest
 
-from face_plugin.tiles.memory import (
-    PROCESS_BYTES,
-    _container_memory,
-    _machine_memory,
-    available_memory,
-    fitting_tile_points,
-    tile_memory,
-    usable_cores,
-)
+from face_plugin.memory import _container_memory, _machine_memory, available_memory, usable_cores
+from face_plugin.tiles.plan import PROCESS_BYTES, fitting_tile_points, tile_memory
 
 
 def test_the_machine_says_what_is_available(tmp_path):

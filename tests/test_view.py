@@ -11,14 +11,14 @@ import polyscope.imgui as imgui
 import pytest
 from PIL import Image
 
-from face_plugin import session as session_module
 from face_plugin import shapes
-from face_plugin.cli import main
+from face_plugin.app.cli import main
+from face_plugin.app.viewer import session as session_module
+from face_plugin.app.viewer.session import Plane, Session
+from face_plugin.app.viewer.window import Viewer
 from face_plugin.io import read_cloud
 from face_plugin.sculpt import SculptFile
-from face_plugin.session import Plane, Session
 from face_plugin.surface import poisson_reconstruction
-from face_plugin.view import Viewer
 
 SIZE = (900, 700)
 
@@ -497,7 +497,7 @@ def test_without_a_display_or_a_renderer(tmp_path, words, code, message):
     # A folder without drivers, as on a machine that has none.
     environment["__EGL_VENDOR_LIBRARY_FILENAMES"] = str(tmp_path / "none.json")
     done = subprocess.run(
-        [sys.executable, "-m", "face_plugin.cli", "view", "ball.npy", "--quiet", *words],
+        [sys.executable, "-m", "face_plugin.app.cli", "view", "ball.npy", "--quiet", *words],
         cwd=tmp_path,
         env=environment,
         capture_output=True,

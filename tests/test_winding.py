@@ -7,7 +7,7 @@ import pytest
 import reference
 
 from face_plugin import shapes
-from face_plugin.normals import unit
+from face_plugin.geometry import unit
 from face_plugin.winding import DipoleTree
 
 

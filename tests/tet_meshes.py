@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 from scipy.spatial.transform import Rotation
 
-from face_plugin.meshers import CageMesh
+from face_plugin.faraday.meshers import CageMesh
 
 
 def grid_mesh(n: int, rotation: Rotation | None = None) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.locate import Locator
-from face_plugin.meshers import CageMesh
+from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.meshers import CageMesh
+from face_plugin.faraday.solve import Clock, solve_level
 from face_plugin.params import Params
-from face_plugin.tiles.level import Clock, solve_level
 
 __all__ = ["Coarse", "Voxels", "nearest_to_centres", "solve_coarse", "voxel_size"]
 

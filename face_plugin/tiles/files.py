@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.io.cloudfile import replacing
+from face_plugin.io.sinks import WRITERS, Columns
+from face_plugin.io.sources import STREAMED, Source, open_source
 from face_plugin.params import Params
-from face_plugin.solver import Progress
-from face_plugin.tiles.choose import EngineLike, allowed_memory
-from face_plugin.tiles.memory import PROCESS_BYTES
+from face_plugin.result import Progress
+from face_plugin.tiles.plan import PROCESS_BYTES, EngineLike, allowed_memory
 from face_plugin.tiles.run import collect, solve_store
-from face_plugin.tiles.sinks import WRITERS, Columns
-from face_plugin.tiles.sources import STREAMED, Source, open_source
 
 __all__ = ["FileResult", "normals_of_file", "streams", "work_folder"]
 

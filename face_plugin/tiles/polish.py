@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin import interior
-from face_plugin.confidence import confidence
+from face_plugin.faraday.gradient import ROUNDING
 from face_plugin.refine import refine
-from face_plugin.solver import ROUNDING
+from face_plugin.sides import enclosure
+from face_plugin.sides.confidence import confidence
 from face_plugin.tiles.scene import scene
 from face_plugin.tiles.solve import one_thread
 from face_plugin.tiles.store import Store
@@ -61,7 +61,7 @@ def _polish(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     clock()
     found: dict[str, NDArray[np.generic]] = {"normals": normals[seen.own]}
     if store.interior:
-        found["enclosed"] = interior.enclosed(seen.points, normals, seen.strength)[seen.own]
+        found["enclosed"] = enclosure.enclosed(seen.points, normals, seen.strength)[seen.own]
     clock()
     found["confidence"] = confidence(seen.points, votes, normals, seen.own)
     clock()

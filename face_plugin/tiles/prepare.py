@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from face_plugin import cloud
 from face_plugin.cloud import Frame
+from face_plugin.io.sources import CHUNK, Source
 from face_plugin.params import Params
-from face_plugin.tiles.choose import allowed_memory
 from face_plugin.tiles.coarse import VOXELS_PER_POINT, Voxels, voxel_size
-from face_plugin.tiles.memory import fitting_tile_points
 from face_plugin.tiles.partition import Partition, split
-from face_plugin.tiles.sources import CHUNK, Source
+from face_plugin.tiles.plan import allowed_memory, fitting_tile_points
 from face_plugin.tiles.store import Store
 
 __all__ = ["SAMPLE", "fill_store", "store_key"]

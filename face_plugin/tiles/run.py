@@ -14,17 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from face_plugin import cloud, interior
+from face_plugin import cloud
+from face_plugin.io.sources import CHUNK, ArraySource, Source
 from face_plugin.params import ALPHAS, Params
-from face_plugin.solver import Progress, Result
-from face_plugin.tiles.choose import EngineLike, make_engine, tile_size
+from face_plugin.result import Progress, Result
+from face_plugin.sides import enclosure
 from face_plugin.tiles.coarse import Voxels, solve_coarse
 from face_plugin.tiles.engines import Engine, Job
+from face_plugin.tiles.plan import EngineLike, make_engine, tile_size
 from face_plugin.tiles.polish import POLISH_STAGES, polish_tile
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.scene import write_far
 from face_plugin.tiles.solve import TILE_STAGES, one_thread, solve_tile
-from face_plugin.tiles.sources import CHUNK, ArraySource, Source
 from face_plugin.tiles.store import Store
 
 __all__ = ["collect", "estimate_tiled", "solve_store", "tile_seconds"]
@@ -255,7 +256,7 @@ def interior_alpha(store: Store) -> float:
         # What is not enclosed does not count, and need not be kept.
         deep = store.read(tile, "normals", "enclosed")["enclosed"]
         strength.append(store.read(tile, "field", "strength")["strength"][deep])
-    return interior.automatic_alpha(np.concatenate(strength))
+    return enclosure.automatic_alpha(np.concatenate(strength))
 
 
 def tile_seconds(store: Store) -> dict[str, float]:

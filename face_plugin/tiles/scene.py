@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin import cloud
-from face_plugin.normals import unit
-from face_plugin.sheets import Sheets
+from face_plugin.geometry import unit
+from face_plugin.sides.sheets import Sheets
 from face_plugin.tiles.coarse import nearest_to_centres
 from face_plugin.tiles.store import Store
 from face_plugin.tiles.surroundings import surroundings

@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
-from face_plugin import cage, field, normals
-from face_plugin.domain import Box
 from face_plugin.errors import MissingDependencyError, require
-from face_plugin.locate import Locator
+from face_plugin.faraday import field, gradient
+from face_plugin.faraday.domain import Box
+from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.solve import solve_level
+from face_plugin.geometry import local_spacing, neighbourhoods
 from face_plugin.params import Params
-from face_plugin.sheets import find_sheets, neighbourhoods
+from face_plugin.sides.sheets import cage_separation, find_sheets
 from face_plugin.tiles.coarse import Coarse
-from face_plugin.tiles.level import solve_level
 from face_plugin.tiles.store import Store
 from face_plugin.tiles.surroundings import Surroundings, surroundings
 
@@ -107,7 +108,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     part = surroundings(store, tile, HALO)
     given = params.cage_spacing
     spacing = None if given is None else given / store.frame.scale
-    separation, sheets = cage.separation(part.points, spacing, coarsen=params.angles == "refined")
+    separation, sheets = cage_separation(part.points, spacing, coarsen=params.angles == "refined")
     if store.refines:
         sheets = sheets or find_sheets(part.points, *neighbourhoods(part.points))
     clock("cage")
@@ -122,7 +123,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     )
     own = part.points[part.own]
     strength = field.strength(level.mesh, level.potential, params.directions)
-    at_balls = normals.ball_means(level.mesh, strength)
+    at_balls = gradient.ball_means(level.mesh, strength)
     ball = cKDTree(level.balls.centres).query(own)[1]
     found = {"strength": at_balls[ball]}
     if store.refines and sheets is not None:
@@ -132,8 +133,8 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         # Inside the isosurface of a level is where the field is below it, in the tile's box as everywhere.
         found["level"] = Locator(level.mesh).interpolate(own, strength)
     clock("field")
-    field_normals = normals.field_normals(level.mesh, strength)
-    carried = normals.carry(level.balls.centres, field_normals, own)
+    field_normals = gradient.field_normals(level.mesh, strength)
+    carried = gradient.carry(level.balls.centres, field_normals, own)
     voxels = cKDTree(own).query(store.voxels(tile))[1]
     clock("normals")
     return {
@@ -153,7 +154,7 @@ def _box(part: Surroundings, params: Params) -> Box:
     """
     lower, upper = part.lower - part.spacing, part.upper + part.spacing
     side = upper - lower
-    wanted = FINEST_CELL * params.finest * float(np.median(cage.local_spacing(part.points)))
+    wanted = FINEST_CELL * params.finest * float(np.median(local_spacing(part.points)))
 
     def misses(cells: int) -> float:
         size = float((side / np.maximum(np.round(side / (side.max() / cells)), 1)).max())

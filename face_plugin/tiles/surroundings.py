@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin import cage, cloud
-from face_plugin.thinning import thin
+from face_plugin import cloud
+from face_plugin.geometry import local_spacing, thin
 from face_plugin.tiles.store import Store
 
 __all__ = ["Surroundings", "surroundings"]
@@ -85,4 +85,4 @@ def _spacing(own: NDArray[np.float64]) -> float:
     distinct = np.unique(own, axis=0)
     if len(distinct) < 2:
         return cloud.MERGE_TOLERANCE
-    return float(np.quantile(cage.local_spacing(distinct), QUANTILE))
+    return float(np.quantile(local_spacing(distinct), QUANTILE))

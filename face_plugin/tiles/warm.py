@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from face_plugin import cage, field, normals
-from face_plugin.confidence import confidence
-from face_plugin.locate import Locator
+from face_plugin.faraday import field, gradient
+from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.solve import solve_level
+from face_plugin.geometry import unit
 from face_plugin.params import Params
 from face_plugin.refine import refine
-from face_plugin.tiles.level import solve_level
+from face_plugin.sides.confidence import confidence
+from face_plugin.sides.sheets import cage_separation
 from face_plugin.tiles.solve import one_thread
 
 __all__ = ["warm_up"]
@@ -20,10 +22,10 @@ POINTS = 100
 
 def warm_up() -> None:
     """Take a small cloud through both stages: libraries and compiled code are then in memory."""
-    ball = normals.unit(np.random.default_rng(0).normal(size=(POINTS, 3)))
+    ball = unit(np.random.default_rng(0).normal(size=(POINTS, 3)))
     with one_thread():
-        level = solve_level(ball, cage.separation(ball, None)[0], Params())
+        level = solve_level(ball, cage_separation(ball, None)[0], Params())
         Locator(level.mesh).interpolate(ball, level.potential)
         strength = field.strength(level.mesh, level.potential, "exact")
-        normals.field_normals(level.mesh, strength)
+        gradient.field_normals(level.mesh, strength)
         confidence(ball, ball, refine(ball, ball, np.ones(POINTS)))

@@ -1,0 +1,112 @@
+"""Normals and interior points of Open3D's clouds."""
+
+from __future__ import annotations
+
+import logging
+import os
+from typing import Any
+
+import numpy as np
+
+from face_plugin.adapters.open3d.cloud import is_empty, points_of, select, set_normals
+from face_plugin.filters import Interior, Normals, PointSet
+from face_plugin.filters.sculpt import sculpted
+from face_plugin.params import Params
+
+__all__ = ["estimate_normals", "remove_interior_points"]
+
+log = logging.getLogger(__name__)
+
+
+def estimate_normals(
+    pcd: Any,
+    search_param: Any = None,
+    fast_normal_computation: bool | float = True,
+    *,
+    max_nn: int | None = None,
+    radius: float | None = None,
+    params: Params | None = None,
+    sculpt: str | os.PathLike[str] | None = None,
+) -> None:
+    """Give the cloud outward normals, in place; they need no orientation afterwards.
+
+    Unlike Open3D's own, it overwrites normals that the cloud has and does not take their signs, and it
+    raises on NaN points and on fewer than four distinct ones. An empty cloud is left as it is, with a
+    logged warning.
+
+    Parameters
+    ----------
+    pcd : open3d.geometry.PointCloud or open3d.t.geometry.PointCloud
+        Of a tensor cloud, dtype and device are kept.
+    search_param, fast_normal_computation, max_nn, radius
+        Those of ``PointCloud.estimate_normals`` in the two APIs; FaCE has no use for them and logs that.
+    params : Params, optional
+    sculpt : path, optional
+        File of charges and cage points, as of ``face mesh --sculpt``.
+
+    Raises
+    ------
+    ValueError
+        Points that are not finite, or too few; or an edit is refused.
+
+    Examples
+    --------
+    >>> import open3d
+    >>> from face_plugin.shapes import sphere
+    >>> pcd = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(sphere(300).points))
+    >>> estimate_normals(pcd)
+    >>> pcd.has_normals()
+    True
+    """
+    given = {
+        "search_param": search_param is not None,
+        "fast_normal_computation": fast_normal_computation is not True,
+        "max_nn": max_nn is not None,
+        "radius": radius is not None,
+    }
+    if any(given.values()):
+        log.debug("FaCE has no use for %s", ", ".join(name for name, is_given in given.items() if is_given))
+    if is_empty(pcd):
+        return
+    layer = sculpted(PointSet(points_of(pcd)), sculpt, params)
+    set_normals(pcd, Normals(params)(layer).normals)
+
+
+def remove_interior_points(
+    pcd: Any,
+    alpha: float | str | None = None,
+    *,
+    params: Params | None = None,
+    sculpt: str | os.PathLike[str] | None = None,
+) -> tuple[Any, Any]:
+    """Drop the points inside the object; colours, covariances and attributes follow those that are kept.
+
+    Parameters
+    ----------
+    pcd : open3d.geometry.PointCloud or open3d.t.geometry.PointCloud
+        Stays as it is.
+    alpha : float or {"auto", "dense", "sparse"}, optional
+        Field strength below which space counts as inside, as in `Params`.
+    params, sculpt
+        As in `estimate_normals`.
+
+    Returns
+    -------
+    pcd
+        New cloud of the same type.
+    index : list of int, or for a tensor cloud a Boolean mask
+        The points kept, as ``remove_statistical_outlier`` and ``remove_statistical_outliers`` give them.
+
+    Examples
+    --------
+    >>> import open3d
+    >>> from face_plugin.shapes import sphere
+    >>> pcd = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(sphere(300).points))
+    >>> kept, index = remove_interior_points(pcd)
+    >>> len(kept.points) == len(index)
+    True
+    """
+    keep = np.ones(len(points_of(pcd)), dtype=np.bool_)
+    if not is_empty(pcd):
+        keep = Interior(alpha, params)(sculpted(PointSet(points_of(pcd)), sculpt, params)).keep
+    return select(pcd, keep)

@@ -1,0 +1,1 @@
+"""The line of each normal, from the points themselves."""

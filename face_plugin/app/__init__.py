@@ -1,0 +1,1 @@
+"""The `face` command, its pictures and its window."""

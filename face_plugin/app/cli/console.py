@@ -1,0 +1,151 @@
+"""What `face` says: progress and messages on stderr, the result on stdout."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from face_plugin.app.cli.bars import Bars
+
+__all__ = ["Console", "guarded_stdout"]
+
+
+@contextmanager
+def guarded_stdout() -> Iterator[Callable[[str], None]]:
+    """Send everything that native libraries print to stderr; yield the only way to write to stdout.
+
+    A C++ mesher that prints a line would otherwise make the JSON on stdout unreadable.
+    """
+    sys.stdout.flush()
+    real = os.dup(1)
+    os.dup2(2, 1)
+    written: list[str] = []
+    try:
+        yield written.append
+    finally:
+        sys.stdout.flush()
+        if os.name == "posix":
+            # C keeps its own buffer, which must be emptied before stdout is itself again.
+            ctypes.CDLL(None).fflush(None)
+        os.dup2(real, 1)
+        os.close(real)
+        try:
+            sys.stdout.write("".join(written))
+            sys.stdout.flush()
+        except BrokenPipeError:
+            # The reader (`head`, say) has seen enough. Python would complain again when it closes stdout.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+class Console:
+    """Progress bars, log messages and the closing summary of one run."""
+
+    def __init__(
+        self, command: str, verbose: bool, quiet: bool, as_json: bool, write: Callable[[str], None]
+    ) -> None:
+        self.command, self.verbose, self.quiet, self.as_json = command, verbose, quiet, as_json
+        self._write = write
+        self._start = time.perf_counter()
+        self._bars: Bars | None = None
+
+    def __enter__(self) -> Console:
+        """Start to show log messages and warnings."""
+        from rich.console import Console as RichConsole
+
+        self._stderr = RichConsole(stderr=True, highlight=False, soft_wrap=True)
+        self._handler = _Handler(self.note)
+        self._loggers = [logging.getLogger("face_plugin"), logging.getLogger("py.warnings")]
+        level = logging.ERROR if self.quiet else logging.DEBUG if self.verbose else logging.WARNING
+        self._levels = [logger.level for logger in self._loggers]
+        for logger in self._loggers:
+            logger.addHandler(self._handler)
+            logger.setLevel(level)
+        logging.captureWarnings(True)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the bars and give logging back."""
+        self._close_bars()
+        logging.captureWarnings(False)
+        for logger, level in zip(self._loggers, self._levels, strict=True):
+            logger.removeHandler(self._handler)
+            logger.setLevel(level)
+
+    def progress(self, stage: str, fraction: float) -> None:
+        """Show a stage: the callback that the library takes."""
+        if self.quiet:
+            return
+        if self._bars is None:
+            from face_plugin.app.cli.bars import Bars
+
+            self._bars = Bars(self._stderr)
+        self._bars.update(stage, fraction)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Show a step of the command itself, such as writing a file."""
+        self.progress(name, 0.0)
+        yield
+        self.progress(name, 1.0)
+
+    def note(self, message: str) -> None:
+        """Write a line to stderr, above the bars."""
+        self._stderr.print(message.rstrip("\n"), markup=False)
+
+    def report(self, summary: Mapping[str, Any], text: str) -> None:
+        """Say what was done: JSON where it was asked for, else one or more lines of text."""
+        self._close_bars()
+        seconds = time.perf_counter() - self._start
+        if self.as_json:
+            full = {"command": self.command, **summary, "seconds": round(seconds, 3), **_peak_memory()}
+            self._write(json.dumps(full, default=_plain) + "\n")
+        elif not self.quiet:
+            self._write(text + "\n")
+
+    def fail(self, message: str, code: int) -> int:
+        """Say what went wrong and return the exit code."""
+        self._close_bars()
+        self.note(f"face: error: {message}")
+        if self.as_json:
+            self._write(json.dumps({"command": self.command, "error": message, "exit_code": code}) + "\n")
+        return code
+
+    def _close_bars(self) -> None:
+        if self._bars is not None:
+            self._bars.close()
+            self._bars = None
+
+
+class _Handler(logging.Handler):
+    def __init__(self, note: Callable[[str], None]) -> None:
+        super().__init__()
+        self._note = note
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._note(f"face: {record.levelname.lower()}: {record.getMessage()}")
+
+
+def _plain(value: Any) -> Any:
+    """Turn what JSON does not know (NumPy numbers, paths) into what it does."""
+    return value.item() if hasattr(value, "item") else str(value)
+
+
+def _peak_memory() -> dict[str, float]:
+    try:
+        import resource
+    except ImportError:  # Windows
+        return {}
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    # Linux counts in KiB, macOS in bytes.
+    return {"peak_memory_mib": round(peak / (2**20 if sys.platform == "darwin" else 2**10), 1)}

@@ -1,8 +1,0 @@
-"""`python -m face_plugin.cli` is the same as `face`."""
-
-import sys
-
-from face_plugin.cli import main
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,138 @@
+"""The front desk: unoriented points in, outward normals and a surface out, in one piece or in tiles."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import time
+
+from numpy.typing import ArrayLike
+
+from face_plugin import cloud
+from face_plugin.params import Params
+from face_plugin.result import Progress, Result, Surface
+from face_plugin.sculpt import SculptFile
+from face_plugin.solver import FaCE
+from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
+from face_plugin.tiles.plan import EngineLike, in_tiles
+from face_plugin.tiles.run import estimate_tiled
+
+__all__ = ["estimate_normals", "reconstruct"]
+
+
+def estimate_normals(
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    filter_interior: bool = False,
+    sculpt: SculptFile | str | os.PathLike[str] | None = None,
+    engine: EngineLike = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Outward normals of an unoriented point cloud by Faraday cage estimation.
+
+    Large clouds are solved in tiles, as `Params.tile_points` says; see `face_plugin.tiles`.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of float or int, in any unit
+        At least four distinct points that do not lie on one line. Duplicates are allowed.
+    params : Params, optional
+    filter_interior : bool
+        Also classify the points as interior or not.
+    sculpt : SculptFile or path, optional
+        Charges and cage points to apply. The cloud is then solved in one piece, whatever its size.
+    engine : str, Engine or distributed.Client, optional
+        Who solves tiles; by default `Params.engine`.
+    progress : callable, optional
+        ``progress(stage, fraction)``.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ValueError
+        Bad input; the message names the argument, what was found and what is allowed.
+    MeshingError
+        The space between the box and the balls could not be meshed.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> normals = estimate_normals(ball.points).normals
+    >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
+    True
+    """
+    array = cloud.as_points(points)
+    if sculpt is not None and not isinstance(sculpt, SculptFile):
+        # A bad file is said before the cage is solved.
+        sculpt = SculptFile.load(sculpt)
+    if sculpt is None and in_tiles(len(array), params or Params()):
+        return estimate_tiled(
+            array, params, filter_interior=filter_interior, engine=engine, progress=progress
+        )
+    face = FaCE(array, params, progress=progress)
+    if sculpt is not None:
+        face = face.sculpted(sculpt)
+    return face.result(filter_interior=filter_interior)
+
+
+def reconstruct(
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    screened: bool = True,
+    depth: int | None = 8,
+    filter_interior: bool = True,
+    backend: Backend | None = None,
+    trim: float = 0.0,
+    sculpt: SculptFile | str | os.PathLike[str] | None = None,
+    engine: EngineLike = None,
+    progress: Progress | None = None,
+) -> Surface:
+    """Reconstruct a closed surface: outward normals, interior points dropped, Poisson reconstruction.
+
+    Parameters
+    ----------
+    points, params, sculpt, engine, progress
+        As in `estimate_normals`.
+    screened : bool
+        Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
+    depth : int or None
+        Depth of the reconstruction's octree, 1 to 16; None: from the spacing of the points, at most 12.
+    filter_interior : bool
+        Leave out the points inside the object.
+    backend : {"open3d", "pymeshlab"}, optional
+        Host that reconstructs; by default whichever is installed.
+    trim : float
+        Fraction of the vertices to drop, those of lowest density. This opens the surface.
+
+    Returns
+    -------
+    Surface
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> surface = reconstruct(sphere(500).points, depth=5)
+    >>> surface.faces.shape[1]
+    3
+    """
+    backend = check_arguments(depth, backend, trim)
+    result = estimate_normals(
+        points, params, filter_interior=filter_interior, sculpt=sculpt, engine=engine, progress=progress
+    )
+    keep = slice(None) if result.interior is None else ~result.interior
+    array = cloud.as_points(points)
+    report = progress or (lambda stage, fraction: None)
+    report("surface", 0.0)
+    start = time.perf_counter()
+    vertices, faces, densities = poisson_reconstruction(
+        array[keep], result.normals[keep], depth=depth, screened=screened, backend=backend, trim=trim
+    )
+    timings = {**result.timings, "surface": time.perf_counter() - start}
+    report("surface", 1.0)
+    return Surface(vertices, faces, densities, dataclasses.replace(result, timings=timings))

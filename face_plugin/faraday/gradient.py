@@ -1,0 +1,65 @@
+"""Normals from the field strength: it grows outward, so its gradient at a ball points outward (paper section 3.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from face_plugin.faraday.field import vertex_gradients
+from face_plugin.faraday.meshers import CageMesh
+from face_plugin.geometry import unit
+
+__all__ = ["ROUNDING", "ball_means", "carry", "field_normals"]
+
+CARRY_NEIGHBOURS = 3
+
+ROUNDING = 1e-9
+"""E_max below which double precision leaves nothing of the direction of its gradient (unshielded space has 1)."""
+
+
+def ball_means(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of vertex values (m, ...) over the cage vertices of each ball: (b, ...)."""
+    owned = np.flatnonzero(mesh.owner >= 0)
+    owner = mesh.owner[owned]
+    count = np.bincount(owner)
+    flat = values[owned].reshape(len(owned), -1)
+    means = np.stack([np.bincount(owner, weights=column) for column in flat.T], axis=1) / count[:, None]
+    return np.asarray(means.reshape(len(count), *values.shape[1:]))
+
+
+def field_normals(mesh: CageMesh, strength: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Average the gradient of E_max over the cage vertices of each ball, and normalise it (paper equation 6).
+
+    Parameters
+    ----------
+    mesh : CageMesh
+    strength : (m,) float64
+
+    Returns
+    -------
+    (b, 3) float64
+    """
+    gradient = vertex_gradients(mesh, strength[:, None])[:, :, 0]
+    return unit(ball_means(mesh, gradient))
+
+
+def carry(
+    centres: NDArray[np.float64], normals: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Give points (n, 3) without a ball normals: those of the nearest balls, weighted by inverse distance.
+
+    A point that is a ball's centre keeps that ball's normal exactly.
+
+    Examples
+    --------
+    >>> carry(np.eye(3), np.eye(3), np.array([[1.0, 0.0, 0.0]]))
+    array([[1., 0., 0.]])
+    """
+    distance, ball = cKDTree(centres).query(points, k=min(CARRY_NEIGHBOURS, len(centres)), workers=-1)
+    weight = 1.0 / np.maximum(distance, 1e-300)
+    weight /= weight.max(axis=1, keepdims=True)
+    # Relative to the nearest: neighbours across a thin wall must not turn it around.
+    near = normals[ball]
+    agree = np.einsum("nkd,nd->nk", near, near[:, 0])
+    return unit(np.einsum("nk,nkd->nd", weight * np.maximum(agree, 0.0), near))

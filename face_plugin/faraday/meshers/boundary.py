@@ -1,0 +1,199 @@
+"""Triangles of the balls and of the box, volumes and orientation: what the meshers and their checks share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from face_plugin.faraday.balls import Balls
+from face_plugin.faraday.domain import Box
+
+__all__ = [
+    "Boundary",
+    "ball_volumes",
+    "boundary_surface",
+    "faces_of_solid",
+    "oriented",
+    "snapped_to_box",
+    "tet_volumes",
+]
+
+# How far from the box a vertex still lies on it, relative to its longest side: a few rounding errors.
+ON_BOX = 1e-12
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Closed surfaces that bound the domain: the balls, then the box."""
+
+    vertices: NDArray[np.float64]
+    """(v, 3) those of the balls, ball by ball, then the box's eight corners."""
+    faces: NDArray[np.int32]
+    """(f, 3) triangles turned out of the domain: into the balls, and out of the box."""
+    owner: NDArray[np.int32]
+    """(f,) index of the ball that a triangle belongs to, -1 for the box."""
+
+
+def tet_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Signed volumes (t,) of tetrahedra.
+
+    Examples
+    --------
+    >>> tet_volumes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]], dtype=np.int32)).round(3)
+    array([0.167])
+    """
+    return np.asarray(_volumes(vertices, tets))
+
+
+def oriented(vertices: NDArray[np.float64], tets: NDArray[np.int32], flat: float) -> NDArray[np.int32]:
+    """Tetrahedra (k, 4) turned positive, without those whose least height is at most `flat`.
+
+    The vertex with the shortest edges comes first: differences from the far end of a needle would lose its
+    volume, and with it its stiffness, to rounding.
+
+    Examples
+    --------
+    >>> oriented(np.vstack([np.zeros(3), np.eye(3)]), np.array([[1, 0, 2, 3]], dtype=np.int32), 1e-14)
+    array([[0, 1, 2, 3]], dtype=int32)
+    """
+    tets = np.ascontiguousarray(tets)
+    _nearest_first(vertices, tets)
+    volume = _volumes(vertices, tets)
+    tets[volume < 0] = tets[volume < 0][:, [0, 2, 1, 3]]
+    return np.asarray(tets[_heights(vertices, tets, volume) > flat])
+
+
+@numba.njit(cache=True)
+def _cross(vertices, i, j, k):  # type: ignore[no-untyped-def]
+    """Return the normal of a triangle, as long as twice its area."""
+    ax, ay, az = (
+        vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
+    )  # fmt: skip
+    bx, by, bz = (
+        vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
+    )  # fmt: skip
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@numba.njit(cache=True)
+def _volumes(vertices, tets):  # type: ignore[no-untyped-def]
+    out = np.empty(len(tets))
+    for t in range(len(tets)):
+        i, j, k, apex = tets[t]
+        n = _cross(vertices, i, j, k)
+        six = 0.0
+        for d in range(3):
+            six += n[d] * (vertices[apex, d] - vertices[i, d])
+        out[t] = six / 6.0
+    return out
+
+
+@numba.njit(cache=True)
+def _nearest_first(vertices, tets):  # type: ignore[no-untyped-def]
+    for t in range(len(tets)):
+        best, shortest = 0, np.inf
+        for i in range(4):
+            total = 0.0
+            for j in range(4):
+                for d in range(3):
+                    total += (vertices[tets[t, i], d] - vertices[tets[t, j], d]) ** 2
+            if total < shortest:
+                best, shortest = i, total
+        tets[t, 0], tets[t, best] = tets[t, best], tets[t, 0]
+
+
+@numba.njit(cache=True)
+def _heights(vertices, tets, volume):  # type: ignore[no-untyped-def]
+    """Least height of each tetrahedron: three volumes over its largest facet."""
+    out = np.zeros(len(tets))
+    for t in range(len(tets)):
+        largest = 0.0
+        for i in range(4):
+            # The facet without vertex i; its own first vertex is the nearest one where it has it.
+            n = _cross(
+                vertices, tets[t, 1 if i == 0 else 0], tets[t, 2 if i < 2 else 1], tets[t, 3 if i < 3 else 2]
+            )
+            largest = max(largest, n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
+        if largest > 0:
+            out[t] = 6.0 * abs(volume[t]) / np.sqrt(largest)
+    return out
+
+
+def faces_of_solid(balls: Balls) -> NDArray[np.int32]:
+    """Triangles (k, 3) of one ball's solid, turned outward; the same numbers serve every ball.
+
+    Examples
+    --------
+    >>> from face_plugin.faraday.balls import build_balls
+    >>> faces_of_solid(build_balls(np.eye(3), np.arange(3))).shape
+    (8, 3)
+    """
+    return _outward_hull((balls.vertices[0] - balls.centres[0]) / balls.radii[0])
+
+
+def ball_volumes(balls: Balls) -> NDArray[np.float64]:
+    """Volume (b,) of each ball's solid.
+
+    Examples
+    --------
+    >>> from face_plugin.faraday.balls import build_balls
+    >>> balls = build_balls(np.eye(3), np.arange(3))
+    >>> bool(np.allclose(ball_volumes(balls), 4 / 3 * balls.radii**3))
+    True
+    """
+    unit = (balls.vertices[0] - balls.centres[0]) / balls.radii[0]
+    return np.asarray(ConvexHull(unit).volume * balls.radii**3)
+
+
+def boundary_surface(balls: Balls, box: Box) -> Boundary:
+    """Surfaces that a constrained mesher has to keep.
+
+    Examples
+    --------
+    >>> from face_plugin.faraday.balls import build_balls
+    >>> from face_plugin.faraday.domain import padded_box
+    >>> balls = build_balls(np.eye(3), np.arange(3))
+    >>> boundary_surface(balls, padded_box(balls, 0.1)).faces.shape
+    (36, 3)
+    """
+    count, solid = balls.vertices.shape[:2]
+    inward = faces_of_solid(balls)[:, ::-1]
+    on_balls = (np.arange(count)[:, None, None] * solid + inward).reshape(-1, 3)
+    corner = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+    on_box = _outward_hull(corner - 0.5) + count * solid
+    return Boundary(
+        np.concatenate([balls.vertices.reshape(-1, 3), np.where(corner == 1, box.upper, box.lower)]),
+        np.concatenate([on_balls, on_box]).astype(np.int32),
+        np.concatenate([np.repeat(np.arange(count), len(inward)), np.full(len(on_box), -1)]).astype(np.int32),
+    )
+
+
+def snapped_to_box(vertices: NDArray[np.float64], box: Box) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Vertices (m, 3) of which those on the box are exactly on it, and which (m,) these are.
+
+    A mesher puts vertices of its own on the box only up to rounding.
+
+    Examples
+    --------
+    >>> unit = Box(np.zeros(3), np.ones(3))
+    >>> vertices, on_box = snapped_to_box(np.array([[0.5, 0.5, 1 - 1e-15], [0.5, 0.5, 0.5]]), unit)
+    >>> vertices[0], on_box
+    (array([0.5, 0.5, 1. ]), array([ True, False]))
+    """
+    tolerance = ON_BOX * float((box.upper - box.lower).max())
+    low, high = vertices - box.lower <= tolerance, box.upper - vertices <= tolerance
+    snapped = np.where(low, box.lower, np.where(high, box.upper, vertices))
+    return snapped, np.asarray((low | high).any(axis=1))
+
+
+def _outward_hull(points: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Triangles of the convex hull of points around the origin, turned outward."""
+    faces = ConvexHull(points).simplices
+    a, b, c = (points[column] for column in faces.T)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return np.asarray(faces, dtype=np.int32)

@@ -1,0 +1,77 @@
+"""Run the libraries that may abort the process in a process of their own.
+
+TetGen and fTetWild end the process they run in on some inputs (failed assertions, exceptions thrown through
+C, exhausted memory). A user's session must survive that, so `face_plugin.faraday.meshers._native_worker` calls them.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.errors import MeshingError
+
+__all__ = ["run_native"]
+
+
+def run_native(
+    library: str, arrays: dict[str, NDArray[np.generic]], *, memory: float, advice: str
+) -> dict[str, NDArray[np.generic]]:
+    """Run a native mesher on arrays in a new process and return the arrays that it gives.
+
+    Works from any script, guarded by ``if __name__ == "__main__"`` or not: the child imports nothing of the
+    caller's.
+
+    Parameters
+    ----------
+    library : {"tetgen", "tetwild"}
+    arrays : dict of arrays
+        What the worker's function of that name takes.
+    memory : float
+        Bytes that the child may allocate; held where the system allows it (not on Windows and macOS).
+    advice : str
+        What to try after a failure; goes into the exception.
+
+    Raises
+    ------
+    MeshingError
+        The child crashed, ran out of memory, or the library refused the input.
+    """
+    if not sys.executable:
+        raise MeshingError(
+            f"{library} runs in a process of its own, and this program names no Python interpreter"
+        )
+    with tempfile.TemporaryDirectory(prefix="face-plugin-") as folder:
+        given, made = Path(folder, "in.npz"), Path(folder, "out.npz")
+        np.savez(given, **arrays)  # type: ignore[arg-type]
+        command = [sys.executable, "-m", "face_plugin.faraday.meshers._native_worker", library]
+        command += [str(given), str(made), str(int(memory))]
+        # fTetWild writes a file __tracked_surface.stl to where it runs.
+        child = subprocess.run(
+            command, cwd=folder, env=_environment(), capture_output=True, text=True, errors="replace"
+        )
+        if child.returncode == 0 and made.exists():
+            with np.load(made) as archive:
+                return dict(archive)
+    raise MeshingError(f"{library} {_reason(child)}; {advice}")
+
+
+def _environment() -> dict[str, str]:
+    """Copy the caller's environment, with its module path: the child must find the same packages."""
+    path = os.pathsep.join(map(os.path.abspath, sys.path))
+    # Without the safe path a file tetgen.py in the working directory would be imported instead of the
+    # library.
+    return {**os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1"}
+
+
+def _reason(child: subprocess.CompletedProcess[str]) -> str:
+    lines = [line.strip() for line in child.stderr.splitlines() if line.strip()]
+    if child.returncode < 0:
+        return f"crashed (signal {-child.returncode}{': ' + lines[0] if lines else ''})"
+    return f"failed ({lines[-1] if lines else f'exit code {child.returncode}'})"

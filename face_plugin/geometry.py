@@ -1,0 +1,174 @@
+"""Points and vectors: neighbours, spacing, planes, even subsets; what several rooms need and none owns."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+__all__ = ["in_threads", "local_spacing", "log_ramp", "neighbourhoods", "plane_fit", "ramp", "thin", "unit"]
+
+# Neighbours that are looked at around a point.
+NEIGHBOURS = 96
+
+
+def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return vectors (k, 3) at length one; a zero vector becomes the z axis.
+
+    Examples
+    --------
+    >>> unit(np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]]))
+    array([[0., 1., 0.],
+           [0., 0., 1.]])
+    """
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 0, vectors / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+
+
+def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[np.float64]:
+    """Mean distance of each point (n, 3) to its nearest `neighbours` others, in the points' unit.
+
+    Examples
+    --------
+    >>> local_spacing(np.arange(3.0)[:, None] * np.array([[1.0, 0, 0]]), 1)
+    array([1., 1., 1.])
+    """
+    k = min(neighbours, len(points) - 1)
+    distance, _ = cKDTree(points).query(points, k=k + 1, workers=-1)
+    return np.asarray(distance[:, 1:].mean(axis=1))
+
+
+def neighbourhoods(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Distances (n, k) to the points among which the next sheet is looked for, and their rows; a point itself first."""
+    found = cKDTree(points).query(points, k=min(NEIGHBOURS + 1, len(points)), workers=-1)
+    return np.asarray(found[0]), np.asarray(found[1])
+
+
+def plane_fit(
+    points: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    neighbour: NDArray[np.intp],
+    count: int,
+    width: float,
+) -> NDArray[np.float64]:
+    """Fit planes: unit normals (n, 3), of either sign, of planes through each point's `count` nearest neighbours.
+
+    Weights are Gaussian, of `width` times the mean distance to those neighbours.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    distance, neighbour : (n, k) float64, (n, k) intp
+        Of the nearest points, ascending, the point itself first; k > count.
+
+    Examples
+    --------
+    >>> flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    >>> from scipy.spatial import cKDTree
+    >>> abs(plane_fit(flat, *cKDTree(flat).query(flat, k=4), count=3, width=1.0)[0]).round(6)
+    array([0., 0., 1.])
+    """
+    distance, neighbour = distance[:, : count + 1], neighbour[:, : count + 1]
+    scale = width * distance[:, 1:].mean(axis=1, keepdims=True)
+    weight = np.exp(-((distance / scale) ** 2))
+    weight /= weight.sum(axis=1, keepdims=True)
+    offset = points[neighbour]
+    offset -= np.einsum("nk,nkd->nd", weight, offset)[:, None]
+    covariance = np.einsum("nk,nki,nkj->nij", weight, offset, offset)
+    return np.ascontiguousarray(np.linalg.eigh(covariance)[1][:, :, 0])
+
+
+def ramp(values: NDArray[np.float64], ends: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """0 at the first end, 1 at the second, linear between.
+
+    Examples
+    --------
+    >>> ramp(np.array([0.0, 0.25, 2.0]), (0.0, 1.0))
+    array([0.  , 0.25, 1.  ])
+    """
+    return np.asarray(np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0))
+
+
+def log_ramp(strength: NDArray[np.float64], ends: Sequence[float]) -> NDArray[np.float64]:
+    """0 at the first end, 1 at the second, linear between in the logarithm: for E_max, which spans many decades.
+
+    Examples
+    --------
+    >>> log_ramp(np.array([0.0, 1.0, 10.0]), (0.1, 10.0))
+    array([0. , 0.5, 1. ])
+    """
+    return ramp(np.log(np.maximum(strength, 1e-9)), np.log(ends))
+
+
+def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> None:
+    """Call ``run(slice)`` for pieces of `count` rows on all cores; a row is computed alone, so any split is equal.
+
+    A core gets at least `least` rows.
+    """
+    pieces = max(1, min(os.cpu_count() or 1, count // least))
+    bounds = np.linspace(0, count, 4 * pieces + 1).astype(int)
+    slices = [slice(a, b) for a, b in itertools.pairwise(bounds)]
+    with ThreadPoolExecutor(pieces) as pool:
+        list(pool.map(run, slices))
+
+
+def thin(
+    points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
+) -> NDArray[np.intp]:
+    """Take a Poisson-disk subset: points in random order, each unless one within its separation was taken.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    separation : (n,) float64, in the points' unit
+    seed : int
+
+    Returns
+    -------
+    (k,) intp
+        Rows of the points taken, ascending. Every point has one of them within its separation.
+
+    Examples
+    --------
+    >>> line = np.arange(4.0)[:, None] * np.array([[1.0, 0, 0]])
+    >>> len(thin(line, np.full(4, 0.5), seed=0))
+    4
+    """
+    order = np.random.default_rng(seed).permutation(len(points))
+    cell = float(separation.max())
+    if cell <= 0:
+        return np.arange(len(points))
+    tree = cKDTree(points)
+    nearest = tree.query(points, k=2, workers=-1)[0][:, 1]
+    crowded = np.flatnonzero(nearest < separation)
+    taken = np.ones(len(points), dtype=np.bool_)
+    if len(crowded) == 0:
+        return np.flatnonzero(taken)
+    lists = tree.query_ball_point(points[crowded], separation[crowded] * (1 - 1e-12), workers=-1)
+    length = np.fromiter((len(x) for x in lists), dtype=np.int64, count=len(lists))
+    start = np.zeros(len(points) + 1, dtype=np.int64)
+    start[crowded + 1] = length
+    np.cumsum(start, out=start)
+    neighbour = np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])
+    return np.flatnonzero(_greedy(order, start, neighbour))
+
+
+@numba.njit(cache=True)
+def _greedy(
+    order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    taken = np.zeros(len(order), dtype=np.bool_)
+    for i in order:
+        free = True
+        for k in range(start[i], start[i + 1]):
+            if taken[neighbour[k]]:
+                free = False
+                break
+        taken[i] = free
+    return taken

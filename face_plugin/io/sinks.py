@@ -1,0 +1,109 @@
+"""Clouds that are written in parts: NPY, binary PLY, LAS and LAZ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.errors import require
+from face_plugin.io import ply as ply_format
+from face_plugin.io.las import _NORMAL as _LAS_NORMAL
+from face_plugin.io.las import _colour, _fresh
+from face_plugin.io.sources import LasSource, Source
+
+__all__ = ["WRITERS"]
+
+Array = NDArray[Any]
+Columns = dict[str, Array]
+"""x, y, z, the normals nx, ny, nz, and any other values of some points, by name."""
+
+_POINT = ("x", "y", "z")
+_NORMAL = ("nx", "ny", "nz")
+_LAS_NAMES = dict(zip(_NORMAL, _LAS_NORMAL, strict=True))
+
+
+def _npy(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
+    """Write an array of one row a point: position, normal, and the other numbers."""
+    out: Any = None
+    seen = 0
+    for part in parts:
+        names = [*_POINT, *_NORMAL, *(name for name in part if name not in _POINT + _NORMAL)]
+        block = np.stack([part[name] for name in names if part[name].dtype.kind in "fiub"], axis=1)
+        if out is None:
+            shape = (count, block.shape[1])
+            out = np.lib.format.open_memmap(path, "w+", dtype=block.dtype, shape=shape)
+        out[seen : seen + len(block)] = block
+        seen += len(block)
+    if out is None:
+        np.save(path, np.empty((0, 6)), allow_pickle=False)
+    else:
+        out.flush()
+
+
+def _ply(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
+    """Write a binary little-endian PLY with one element."""
+    from plyfile import PlyData, PlyElement
+
+    with open(path, "wb") as stream:
+        for k, part in enumerate(parts):
+            # The type of a wide integer must not hang on the values of one part.
+            narrow = {
+                name: values.astype(np.float64) if values.dtype in (np.int64, np.uint64) else values
+                for name, values in part.items()
+            }
+            element = ply_format.element("vertex", narrow)
+            if k == 0:
+                whole = PlyElement("vertex", element.properties, count, [])
+                stream.write(PlyData([whole], byte_order="<").header.encode("ascii", "replace") + b"\n")
+            stream.write(element.data.astype(element.data.dtype.newbyteorder("<")).tobytes())
+
+
+def _las(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
+    """Write LAS or LAZ; the header of a source of that kind is kept."""
+    laspy: Any = require("laspy", extra="las")
+    header: Any = None
+    writer: Any = None
+    try:
+        for part in parts:
+            named = {_LAS_NAMES.get(name, name[:32]): values for name, values in part.items()}
+            if writer is None:
+                header = _las_header(laspy, named, source)
+                compress = path.suffix.lower() == ".laz"
+                writer = laspy.open(str(path), mode="w", header=header, do_compress=compress)
+            records = laspy.ScaleAwarePointRecord.zeros(len(named["x"]), header=header)
+            for name, values in named.items():
+                if name in _POINT or name in set(header.point_format.dimension_names):
+                    records[name] = _colour(values) if name in ("red", "green", "blue") else values
+            writer.write_points(records)
+    finally:
+        if writer is not None:
+            writer.close()
+
+
+def _las_header(laspy: Any, part: Columns, source: Source) -> Any:
+    """Header of the source, or a new one around it, with dimensions for what it has no place for."""
+    if isinstance(source, LasSource):
+        with laspy.open(str(source.path)) as reader:
+            header = reader.header
+    else:
+        corners = np.concatenate([[p.min(axis=0), p.max(axis=0)] for p, _ in source.parts()])
+        header = _fresh(laspy, corners).header
+    known = {*_POINT, *header.point_format.dimension_names}
+    for name, values in part.items():
+        if name not in known and values.dtype.kind in "fiub":
+            kind = np.dtype(np.uint8) if values.dtype.kind == "b" else values.dtype
+            header.add_extra_dim(laspy.ExtraBytesParams(name=name, type=kind))
+    return header
+
+
+WRITERS: dict[str, Callable[[Path, int, Iterator[Columns], Source], None]] = {
+    ".npy": _npy,
+    ".ply": _ply,
+    ".las": _las,
+    ".laz": _las,
+}
+"""Writers by extension: ``write(path, number of points, parts, source)``."""

@@ -1,0 +1,1 @@
+"""On which side of each point is free space."""

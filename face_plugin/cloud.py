@@ -123,9 +123,7 @@ def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         first = ", ".join(map(str, bad[:5])) + (", ..." if len(bad) > 5 else "")
-        raise ValueError(
-            f"{name} must be finite, found NaN or infinity in {len(bad)} of {len(array)} rows: {first}"
-        )
+        raise ValueError(f"{name} must be finite, found NaN or infinity in {len(bad)} of {len(array)} rows: {first}")
     return array
 
 
@@ -176,8 +174,7 @@ def prepare(points: ArrayLike) -> Cloud:
     distinct = work[order[leads]]
     if len(distinct) < MINIMUM_POINTS:
         raise ValueError(
-            f"points must hold at least {MINIMUM_POINTS} distinct points, "
-            f"found {len(distinct)} among {len(array)}"
+            f"points must hold at least {MINIMUM_POINTS} distinct points, found {len(distinct)} among {len(array)}"
         )
     place = np.empty(len(work), dtype=np.intp)
     place[order] = np.cumsum(leads) - 1

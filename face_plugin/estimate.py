@@ -71,9 +71,7 @@ def estimate_normals(
         # A bad file is said before the cage is solved.
         sculpt = SculptFile.load(sculpt)
     if sculpt is None and in_tiles(len(array), params or Params()):
-        return estimate_tiled(
-            array, params, filter_interior=filter_interior, engine=engine, progress=progress
-        )
+        return estimate_tiled(array, params, filter_interior=filter_interior, engine=engine, progress=progress)
     face = FaCE(array, params, progress=progress)
     if sculpt is not None:
         face = face.sculpted(sculpt)

@@ -118,9 +118,7 @@ def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> No
         list(pool.map(run, slices))
 
 
-def thin(
-    points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
-) -> NDArray[np.intp]:
+def thin(points: NDArray[np.float64], separation: NDArray[np.float64], seed: int) -> NDArray[np.intp]:
     """Take a Poisson-disk subset: points in random order, each unless one within its separation was taken.
 
     Parameters
@@ -160,9 +158,7 @@ def thin(
 
 
 @numba.njit(cache=True)
-def _greedy(
-    order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _greedy(order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]) -> NDArray[np.bool_]:
     taken = np.zeros(len(order), dtype=np.bool_)
     for i in order:
         free = True

@@ -162,9 +162,7 @@ def _integer(params: Params, name: str, least: int) -> None:
         raise ValueError(f"{name} must be an integer >= {least}, found {value!r}")
 
 
-def _number(
-    params: Params, name: str, low: float, high: float, *, closed: bool = False, least: bool = False
-) -> None:
+def _number(params: Params, name: str, low: float, high: float, *, closed: bool = False, least: bool = False) -> None:
     """Raise unless the field is a number in (low, high); `closed` admits `high`, `least` admits `low`."""
     value = getattr(params, name)
     span = f"{'[' if least else '('}{low:g}, {high:g}{']' if closed else ')'}"

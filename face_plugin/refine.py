@@ -31,7 +31,6 @@ from face_plugin.winding import DipoleTree
 __all__ = ["refine"]
 
 
-
 def refine(
     points: NDArray[np.float64],
     normals: NDArray[np.float64],

@@ -78,9 +78,7 @@ class FaCE(Sculptable):
         # 2. Conducting balls at the points: near-duplicates left out, and points on sheets with nothing else near.
         with self._stage("cage"):
             spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
-            separation, self._sheets = cage_separation(
-                self.cloud.points, spacing, coarsen=params.angles == "refined"
-            )
+            separation, self._sheets = cage_separation(self.cloud.points, spacing, coarsen=params.angles == "refined")
             rows = thin(self.cloud.points, separation, params.seed)
             self.balls = build_balls(
                 self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
@@ -185,9 +183,7 @@ class FaCE(Sculptable):
             inside = np.ones(len(self.cloud.points), dtype=np.bool_) if enclosed is None else enclosed.copy()
             if inside.any():
                 candidates = self.cloud.points[inside]
-                inside[inside] = shielded(
-                    self.mesh, self.vertex_strength, candidates, level, self.params.inside
-                )
+                inside[inside] = shielded(self.mesh, self.vertex_strength, candidates, level, self.params.inside)
             return inside[self.cloud.rows]
 
     def _threshold(self, alpha: float | str) -> tuple[float, NDArray[np.bool_] | None]:

@@ -81,9 +81,7 @@ def poisson_reconstruction(
     """
     backend = check_arguments(depth, backend, trim)
     if len(points) < FEWEST_POINTS:
-        raise ValueError(
-            f"points must hold at least {FEWEST_POINTS} points to reconstruct from, found {len(points)}"
-        )
+        raise ValueError(f"points must hold at least {FEWEST_POINTS} points to reconstruct from, found {len(points)}")
     # Hosts work partly in single precision: reconstruct near the origin and at unit size.
     origin = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
     size = float(np.ptp(points, axis=0).max())
@@ -153,9 +151,7 @@ def is_closed(faces: NDArray[np.integer]) -> bool:
     return len(faces) > 0 and np.array_equal(np.sort(there), np.sort(back))
 
 
-def _open3d(
-    points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
-) -> Mesh:
+def _open3d(points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float) -> Mesh:
     o3d = require("open3d", extra="open3d")
     pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     pcd.normals = o3d.utility.Vector3dVector(normals)

@@ -131,9 +131,7 @@ class Chain(Filter):
         # A chain and its sculpt lie side by side, wherever the chain is run from.
         return cls(
             [
-                dataclasses.replace(step, file=str(path.parent / step.file))
-                if isinstance(step, Sculpt)
-                else step
+                dataclasses.replace(step, file=str(path.parent / step.file)) if isinstance(step, Sculpt) else step
                 for step in chain.steps
             ]
         )

@@ -66,9 +66,7 @@ class Sculpt(Filter):
         return layer.replace(cage=cage.sculpted(self.file))
 
 
-def sculpted(
-    layer: PointSet, file: str | os.PathLike[str] | None, params: Params | None = None
-) -> PointSet:
+def sculpted(layer: PointSet, file: str | os.PathLike[str] | None, params: Params | None = None) -> PointSet:
     """Return `layer` with the edits of a sculpt file; as it is where that is None. For adapters.
 
     Examples

@@ -256,9 +256,7 @@ def test_registered_filters_are_methods_and_known_by_name():
         first = ms.mesh(0).vertex_normal_matrix()
         assert ms.apply_filter("compute_normal_by_faraday_cage", seed=2) == {}
         assert np.array_equal(first, estimate_normals(SHAPE.points, Params(seed=1)).normals)
-        assert np.array_equal(
-            ms.mesh(0).vertex_normal_matrix(), estimate_normals(SHAPE.points, Params(seed=2)).normals
-        )
+        assert np.array_equal(ms.mesh(0).vertex_normal_matrix(), estimate_normals(SHAPE.points, Params(seed=2)).normals)
         assert ms.get_geometric_measures()["bbox"] is not None
         with pytest.raises(ml.PyMeshLabException, match="Filter does not exists"):
             ms.apply_filter("compute_normal_by_magic")

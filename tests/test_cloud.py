@@ -6,10 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from face_plugin import cloud
 
-GOOD = (
-    np.random.default_rng(0).normal(size=(60, 3)) * [3.0, 2.0, 1.0]
-    + np.random.default_rng(1).random((60, 3)) ** 4
-)
+GOOD = np.random.default_rng(0).normal(size=(60, 3)) * [3.0, 2.0, 1.0] + np.random.default_rng(1).random((60, 3)) ** 4
 
 
 def broken(row, value):

@@ -24,9 +24,7 @@ def test_gradients_of_linear_functions_are_exact(mesh):
 def test_gradients_are_weighted_by_volume(mesh):
     values = np.random.default_rng(2).normal(size=(len(mesh.vertices), 2))
     expected = reference.vertex_gradients(mesh, values)
-    np.testing.assert_allclose(
-        field.vertex_gradients(mesh, values), expected, atol=1e-9 * np.abs(expected).max()
-    )
+    np.testing.assert_allclose(field.vertex_gradients(mesh, values), expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_vertex_without_tetrahedra_has_no_gradient(mesh):
@@ -108,6 +106,5 @@ def test_strength_against_the_reference(mesh):
         field.strength(mesh, potential, "icosahedron"), reference.strength(mesh, potential, six), rtol=1e-9
     )
     assert (
-        field.strength(mesh, potential, "exact")
-        >= field.strength(mesh, potential, "icosahedron") * (1 - 1e-12)
+        field.strength(mesh, potential, "exact") >= field.strength(mesh, potential, "icosahedron") * (1 - 1e-12)
     ).all()

@@ -178,9 +178,7 @@ def test_majority_and_threshold_on_open_surfaces() -> None:
 def test_where_the_methods_differ() -> None:
     # A block with a hole drilled into it, and a point in the hole, which few rays leave.
     block = cells(
-        lambda p: (
-            (np.abs(p).max(axis=-1) < 0.6) & ~((np.abs(p[..., :2]).max(axis=-1) < 0.3) & (p[..., 2] > -0.3))
-        )
+        lambda p: (np.abs(p).max(axis=-1) < 0.6) & ~((np.abs(p[..., :2]).max(axis=-1) < 0.3) & (p[..., 2] > -0.3))
     )
     v, f = surface(block)
     hole = np.array([[0.0, 0.0, -0.2]])

@@ -21,14 +21,10 @@ CLOUDS = {
     "plane": RNG.random((200, 3)) * [1, 1, 0],
     "plane lattice": LATTICE[LATTICE[:, 2] == 0],
     "line and one": np.vstack([np.linspace([0, 0, 0], [1, 0, 0], 60), [[0.5, 0.1, 0.0]]]),
-    "circle": np.column_stack(
-        [np.cos(np.arange(50) * np.pi / 25), np.sin(np.arange(50) * np.pi / 25), np.zeros(50)]
-    ),
+    "circle": np.column_stack([np.cos(np.arange(50) * np.pi / 25), np.sin(np.arange(50) * np.pi / 25), np.zeros(50)]),
     "two densities": np.vstack([shapes.sphere(200).points, 1e-6 * shapes.sphere(200).points + [3, 0, 0]]),
     "geometric": np.geomspace(1e-6, 1, 200)[:, None] * RNG.normal(size=(200, 3)),
-    "twins": np.vstack(
-        [shapes.sphere(200).points, shapes.sphere(200).points + 1e-7 * RNG.normal(size=(200, 3))]
-    ),
+    "twins": np.vstack([shapes.sphere(200).points, shapes.sphere(200).points + 1e-7 * RNG.normal(size=(200, 3))]),
     "needle": shapes.sphere(100).points * [1e3, 1, 1],
     "four": np.vstack([np.zeros(3), np.eye(3)]),
     "five": np.vstack([np.zeros(3), np.eye(3), [[0.3, 0.3, -0.7]]]),
@@ -96,9 +92,7 @@ def test_meshes_from_several_threads_at_once():
     clouds = [np.random.default_rng(k).random((2000, 3)) for k in range(4)]
     expected = [tetrahedralize(cloud) for cloud in clouds]
     found = {}
-    threads = [
-        threading.Thread(target=lambda k=k: found.update({k: tetrahedralize(clouds[k])})) for k in range(4)
-    ]
+    threads = [threading.Thread(target=lambda k=k: found.update({k: tetrahedralize(clouds[k])})) for k in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

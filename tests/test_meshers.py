@@ -210,9 +210,7 @@ def test_gate_refuses_what_cannot_be_meshed():
 def test_point_on_the_box_is_refused(mesher):
     balls, spacing, box = caged(BALL.points)
     through = domain.Box(box.lower, np.array([balls.centres[:, 0].max(), *box.upper[1:]]))
-    with pytest.raises(
-        MeshingError, match=r"a ball comes within -.* of the box .*try a larger Params.padding"
-    ):
+    with pytest.raises(MeshingError, match=r"a ball comes within -.* of the box .*try a larger Params.padding"):
         build_mesh(balls, spacing, through, Params(mesher=mesher))
 
 

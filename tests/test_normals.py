@@ -24,9 +24,7 @@ def test_means_over_balls_and_normals_against_the_reference():
     np.testing.assert_allclose(
         gradient.ball_means(mesh, strength), [strength[mesh.owner == k].mean() for k in range(10)]
     )
-    np.testing.assert_allclose(
-        gradient.field_normals(mesh, strength), reference.normals(mesh, strength), atol=1e-9
-    )
+    np.testing.assert_allclose(gradient.field_normals(mesh, strength), reference.normals(mesh, strength), atol=1e-9)
 
 
 def test_normal_of_a_linear_strength_is_its_slope():

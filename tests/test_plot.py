@@ -42,9 +42,7 @@ def test_the_nearer_mesh_hides_the_farther(order: int) -> None:
     colours = np.repeat([RED, GREEN], len(VERTICES), axis=0)
     camera = Camera.around(VERTICES, view=(0.0, 0.0))
     near = render_mesh(vertices, faces, camera=camera, colours=colours, size=100)
-    far = render_mesh(
-        vertices, faces, camera=Camera.around(VERTICES, view=(180.0, 0.0)), colours=colours, size=100
-    )
+    far = render_mesh(vertices, faces, camera=Camera.around(VERTICES, view=(180.0, 0.0)), colours=colours, size=100)
     assert greenish(near)[50, 50]
     assert reddish(near)[50, 10]
     assert not greenish(far).any()

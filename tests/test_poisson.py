@@ -150,9 +150,7 @@ def test_given_cage_potential_and_superposition():
     mesh = poisson.mesh
     box = mesh.vertices[mesh.boundary]
     held = poisson.solve(box, np.array([1.0, -2.0, 0.5]))
-    np.testing.assert_array_equal(
-        held[mesh.owner >= 0], np.tile([1.0, -2.0, 0.5], ((mesh.owner >= 0).sum(), 1))
-    )
+    np.testing.assert_array_equal(held[mesh.owner >= 0], np.tile([1.0, -2.0, 0.5], ((mesh.owner >= 0).sum(), 1)))
     np.testing.assert_array_equal(held[mesh.boundary], box)
     v = np.array([[0.6], [0.0], [-0.8]])
     np.testing.assert_allclose(poisson.solve(box @ v), poisson.solve(box) @ v, atol=1e-12)
@@ -169,9 +167,7 @@ def test_cholmod_agrees_with_superlu_or_says_what_to_install(demo_face):
             Poisson(mesh, "cholmod")
     else:
         # Measured: 1e-15.
-        np.testing.assert_allclose(
-            Poisson(mesh, "cholmod").solve(box), Poisson(mesh, "superlu").solve(box), atol=1e-12
-        )
+        np.testing.assert_allclose(Poisson(mesh, "cholmod").solve(box), Poisson(mesh, "superlu").solve(box), atol=1e-12)
 
 
 def test_order_of_tetrahedra_does_not_matter():

@@ -108,7 +108,7 @@ def test_what_leaks_into_a_closed_body_does_not_decide():
 def test_bulk_tells_bars_from_sheets():
     points, _ = bar()
     box = shapes.box(3000, 0)
-    off_edges = (np.sort(np.array([0.5, 0.4, 0.3]) - np.abs(box.points), axis=1)[:, 1] > 0.1)
+    off_edges = np.sort(np.array([0.5, 0.4, 0.3]) - np.abs(box.points), axis=1)[:, 1] > 0.1
     on_bar = bulk(points, cKDTree(points).query(points, k=13)[1])
     on_box = bulk(box.points, cKDTree(box.points).query(box.points, k=13)[1])
     assert np.median(on_bar) > 0.4

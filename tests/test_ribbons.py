@@ -81,9 +81,7 @@ def test_select():
     sketch = teapot_sketch()
     part = sketch.select(np.array([2, 5]))
     assert part.stroke_count == 2
-    np.testing.assert_array_equal(
-        part.vertices[part.vertex_strokes == 1], sketch.vertices[sketch.vertex_strokes == 5]
-    )
+    np.testing.assert_array_equal(part.vertices[part.vertex_strokes == 1], sketch.vertices[sketch.vertex_strokes == 5])
     assert (part.vertex_strokes >= 0).all()
     with pytest.raises(ValueError, match="none selected"):
         sketch.select(np.array([], dtype=int))

@@ -30,9 +30,7 @@ def station(x, y, up=1.0):
 
 def quads(first, stations):
     starts = range(first, first + 3 * (stations - 1), 3)
-    return [
-        f"4 {c + a} {c + b} {c + e} {c + f}" for c in starts for a, b, e, f in ((0, 1, 4, 3), (0, 3, 5, 2))
-    ]
+    return [f"4 {c + a} {c + b} {c + e} {c + f}" for c in starts for a, b, e, f in ((0, 1, 4, 3), (0, 3, 5, 2))]
 
 
 def triples(tmp_path, vertices, faces, name="sketch.ply", counts=None):
@@ -132,9 +130,7 @@ def test_obj_strips_and_groups(tmp_path):
 
 def test_soup_without_shared_vertices_is_welded(tmp_path):
     corners = np.array([[x, y, z] for z in (0, 5) for x in range(4) for y in (0, 1)], dtype=float)
-    faces = np.array(
-        [[z + 2 * k + j for j in t] for z in (0, 8) for k in range(3) for t in ((0, 2, 3), (0, 3, 1))]
-    )
+    faces = np.array([[z + 2 * k + j for j in t] for z in (0, 8) for k in range(3) for t in ((0, 2, 3), (0, 3, 1))])
     path = tmp_path / "soup.ply"
     write_mesh(path, corners[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3))
     assert read_sketch(path).stroke_count == 2

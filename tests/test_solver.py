@@ -51,9 +51,7 @@ def test_analytic_truth(name, seed):
     assert error <= most
 
 
-@pytest.mark.parametrize(
-    "params", [Params.paper(mesher="delaunay"), Params(solid="icosahedron", cage_spacing=0.0)]
-)
+@pytest.mark.parametrize("params", [Params.paper(mesher="delaunay"), Params(solid="icosahedron", cage_spacing=0.0)])
 def test_choices_of_the_paper_agree_with_ours(params):
     shape = shapes.torus(500, 0)
     aligned, error = judged(shape, estimate_normals(shape.points, params).normals)
@@ -65,8 +63,7 @@ def test_choices_of_the_paper_agree_with_ours(params):
 def test_six_directions_and_all_of_them_give_the_same_normals():
     points = shapes.torus(800, 0).points
     exact, six = (
-        estimate_normals(points, Params(directions=d, angles="field")).normals
-        for d in ("exact", "icosahedron")
+        estimate_normals(points, Params(directions=d, angles="field")).normals for d in ("exact", "icosahedron")
     )
     angle = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", exact, six), -1, 1)))
     # The prototype had 0.1 degrees on dense input. Measured for three seeds of this coarse torus: 1.34 to
@@ -98,9 +95,7 @@ def test_interior_points_are_shielded():
     assert strength[~shape.interior].min() > 0.2
 
 
-@pytest.mark.parametrize(
-    "turn", [Rotation.identity(), Rotation.from_euler("xyz", [1, 2, 3])], ids=["axis", "tilted"]
-)
+@pytest.mark.parametrize("turn", [Rotation.identity(), Rotation.from_euler("xyz", [1, 2, 3])], ids=["axis", "tilted"])
 def test_flat_sheet_has_the_normal_of_its_plane_and_a_warning(turn, caplog):
     points = turn.apply(np.column_stack([np.random.default_rng(0).random((400, 2)), np.zeros(400)]))
     with caplog.at_level(logging.WARNING):

@@ -49,9 +49,7 @@ def test_screening_passes_nearer_to_the_points():
 @pytest.mark.parametrize("backend", INSTALLED)
 def test_place_and_scale_do_not_matter(backend):
     vertices, faces, _ = poisson_reconstruction(BALL.points, BALL.normals, depth=5, backend=backend)
-    moved, same_faces, _ = poisson_reconstruction(
-        1e-3 * BALL.points + 1e3, BALL.normals, depth=5, backend=backend
-    )
+    moved, same_faces, _ = poisson_reconstruction(1e-3 * BALL.points + 1e3, BALL.normals, depth=5, backend=backend)
     assert len(same_faces) == len(faces)
     # 1e3 + 1e-3 keeps 1e-10 of the radius, which may change the order of the vertices; the hosts themselves
     # round to single precision. Measured: 4e-7.
@@ -60,9 +58,7 @@ def test_place_and_scale_do_not_matter(backend):
 
 @pytest.mark.parametrize("backend", INSTALLED)
 def test_same_input_same_surface(backend):
-    first, again = (
-        poisson_reconstruction(BALL.points, BALL.normals, depth=5, backend=backend) for _ in range(2)
-    )
+    first, again = (poisson_reconstruction(BALL.points, BALL.normals, depth=5, backend=backend) for _ in range(2))
     np.testing.assert_array_equal(again[1], first[1])
     np.testing.assert_array_equal(again[0], first[0])
 

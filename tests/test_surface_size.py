@@ -31,8 +31,7 @@ def test_the_depth_follows_the_spacing_and_not_the_unit():
 
 # Peak of the process above that before, measured with Open3D 0.19 on these points.
 @pytest.mark.parametrize(
-    ("n", "depth", "gigabytes"), [(200_000, 7, 0.070), (200_000, 8, 0.213), (200_000, 10, 0.564), (20_000,
-    10, 0.114)]
+    ("n", "depth", "gigabytes"), [(200_000, 7, 0.070), (200_000, 8, 0.213), (200_000, 10, 0.564), (20_000, 10, 0.114)]
 )
 def test_memory_as_measured(n, depth, gigabytes):
     assert 0.5 < reconstruction_memory(random_sphere(n), depth) / 1e9 / gigabytes < 2.0

@@ -15,9 +15,7 @@ __all__ = ["add_surface", "current_points", "write_normals", "write_scalar", "wr
 _fresh = itertools.count()
 
 
-def current_points(
-    ms: Any, name: str, *, transformed: bool = False, onselected: bool = False
-) -> NDArray[np.float64]:
+def current_points(ms: Any, name: str, *, transformed: bool = False, onselected: bool = False) -> NDArray[np.float64]:
     """Vertices (n, 3) of the current layer, in its own coordinates or the scene's.
 
     Raises

@@ -74,9 +74,7 @@ def build_balls(
     (3, 6, 3)
     """
     if len(rows) < 2:
-        raise ValueError(
-            f"cage_spacing must leave at least 2 balls, found {len(rows)} for {len(points)} points"
-        )
+        raise ValueError(f"cage_spacing must leave at least 2 balls, found {len(rows)} for {len(points)} points")
     centres = points[rows]
     nearest = cKDTree(centres).query(centres, k=2, workers=-1)[0][:, 1]
     radii = radius * nearest

@@ -113,9 +113,7 @@ def _strength_exact(gradients):  # type: ignore[no-untyped-def]
         if p > 1e-14 * q:
             b00, b11, b22 = (m00 - q) / p, (m11 - q) / p, (m22 - q) / p
             b01, b02, b12 = m01 / p, m02 / p, m12 / p
-            half = 0.5 * (
-                b00 * (b11 * b22 - b12 * b12) - b01 * (b01 * b22 - b12 * b02) + b02 * (b01 * b12 - b11 * b02)
-            )
+            half = 0.5 * (b00 * (b11 * b22 - b12 * b12) - b01 * (b01 * b22 - b12 * b02) + b02 * (b01 * b12 - b11 * b02))
             largest = q + 2.0 * p * np.cos(np.arccos(min(1.0, max(-1.0, half))) / 3.0)
         out[i] = np.sqrt(max(largest, 0.0))
     return out
@@ -135,9 +133,7 @@ def half_icosahedron() -> NDArray[np.float64]:
     return np.asarray(vertices[(vertices @ np.array([1.0, 0.1, 0.01])) > 0])
 
 
-def strength_of_directions(
-    gradients: NDArray[np.float64], directions: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def strength_of_directions(gradients: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """E_max over given unit directions (d, 3): ``max |G v|`` (paper equation 5).
 
     Examples

@@ -172,9 +172,7 @@ def inside_by_rays(
     return result
 
 
-def inside_by_winding(
-    points: ArrayLike, v: ArrayLike, f: ArrayLike, *, threshold: float = 0.9
-) -> NDArray[np.bool_]:
+def inside_by_winding(points: ArrayLike, v: ArrayLike, f: ArrayLike, *, threshold: float = 0.9) -> NDArray[np.bool_]:
     """Tell where the generalised winding number of a surface exceeds a threshold.
 
     Parameters
@@ -226,9 +224,7 @@ def inside_by_winding(
 class _Rays:
     """A surface in Embree."""
 
-    def __init__(
-        self, corners: NDArray[np.float32], faces: NDArray[np.int64], normals: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, corners: NDArray[np.float32], faces: NDArray[np.int64], normals: NDArray[np.float64]) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -238,9 +234,7 @@ class _Rays:
         # Our own normals instead of Embree's, whose sense has changed between its versions.
         self.normals = normals
 
-    def votes(
-        self, origins: NDArray[np.float64], directions: int, rng: np.random.Generator
-    ) -> NDArray[np.int64]:
+    def votes(self, origins: NDArray[np.float64], directions: int, rng: np.random.Generator) -> NDArray[np.int64]:
         """Count the rays from each origin that first hit the surface from behind."""
         rays = _spread(directions, rng) + _JITTER * rng.standard_normal((len(origins), directions, 3))
         ray = np.ascontiguousarray(rays.reshape(-1, 3), dtype=np.float32)
@@ -296,7 +290,5 @@ def _checked(
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         raise ValueError(f"f: integers of shape (q, 3) are needed, got {faces.dtype} of shape {faces.shape}")
     if faces.size and (faces.min() < 0 or faces.max() >= len(arrays[1])):
-        raise ValueError(
-            f"f: indices from 0 to {len(arrays[1]) - 1} are allowed, got {faces.min()} to {faces.max()}"
-        )
+        raise ValueError(f"f: indices from 0 to {len(arrays[1]) - 1} are allowed, got {faces.min()} to {faces.max()}")
     return arrays[0], arrays[1], faces.astype(np.int64)

@@ -114,9 +114,7 @@ def isosurface(
     return points[a] + t[:, None] * (points[b] - points[a]), number.reshape(-1, 3)
 
 
-def fill_balls(
-    mesh: CageMesh, values: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
+def fill_balls(mesh: CageMesh, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
     """Fill the balls of a mesh, so that it covers the whole box.
 
     Each ball gets a vertex at the mean of its cage vertices, with the mean of their values, and one
@@ -187,9 +185,7 @@ def fill_balls(
     )
 
 
-def _check(
-    points: NDArray[np.float64], cells: NDArray[Any], field: NDArray[np.float64], level: float
-) -> None:
+def _check(points: NDArray[np.float64], cells: NDArray[Any], field: NDArray[np.float64], level: float) -> None:
     """Raise `ValueError` for what `isosurface` cannot use."""
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"vertices: an array of shape (m, 3) is needed, got {points.shape}")
@@ -198,9 +194,7 @@ def _check(
     if field.shape != (len(points),):
         raise ValueError(f"values: shape ({len(points)},) is needed, one a vertex, got {field.shape}")
     if cells.size and (cells.min() < 0 or cells.max() >= len(points)):
-        raise ValueError(
-            f"tets: indices from 0 to {len(points) - 1} are allowed, got {cells.min()} to {cells.max()}"
-        )
+        raise ValueError(f"tets: indices from 0 to {len(points) - 1} are allowed, got {cells.min()} to {cells.max()}")
     for name, data in (("vertices", points), ("values", field), ("level", np.asarray(level))):
         if not np.isfinite(data).all():
             raise ValueError(f"{name}: finite numbers are needed, got NaN or infinity")

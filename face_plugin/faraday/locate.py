@@ -154,11 +154,7 @@ def _coordinates(p, vertices, tet, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _det(a, b, c):  # type: ignore[no-untyped-def]
-    return (
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-        + a[1] * (b[2] * c[0] - b[0] * c[2])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
-    )
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
 @numba.njit(cache=True)

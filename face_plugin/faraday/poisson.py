@@ -90,9 +90,7 @@ class Poisson:
         u[self.mesh.owner >= 0] = cage_value
         return u
 
-    def _floating_value(
-        self, box_values: NDArray[np.float64], particular: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _floating_value(self, box_values: NDArray[np.float64], particular: NDArray[np.float64]) -> NDArray[np.float64]:
         """u_C (s,) at which the net flux out of the cage is zero.
 
         The balls share no tetrahedron with the box as long as a free vertex lies between; where one does, its
@@ -118,9 +116,7 @@ def columns(mesh: CageMesh) -> NDArray[np.int64]:
     return column
 
 
-def stiffness(
-    vertices: NDArray[np.float64], tets: NDArray[np.int32], column: NDArray[np.int64]
-) -> sparse.csr_matrix:
+def stiffness(vertices: NDArray[np.float64], tets: NDArray[np.int32], column: NDArray[np.int64]) -> sparse.csr_matrix:
     """Rows of the cotangent Laplacian L that belong to free vertices.
 
     The entry of an edge is ``L_ij = sum over tets of volume * grad(phi_i) . grad(phi_j)``.

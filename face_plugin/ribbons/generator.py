@@ -148,9 +148,7 @@ def _limb(
     count = max(3, round(np.pi * radius / gap))
     side = np.linspace(-0.5 * length, 0.5 * length, _LIMB_STEPS)
     tip = np.linspace(0.0, np.pi, _LIMB_STEPS // 2)[1:-1]
-    across = np.concatenate(
-        [np.full(_LIMB_STEPS, radius), radius * np.cos(tip), np.full(_LIMB_STEPS, -radius)]
-    )
+    across = np.concatenate([np.full(_LIMB_STEPS, radius), radius * np.cos(tip), np.full(_LIMB_STEPS, -radius)])
     height = np.concatenate([side, 0.5 * length + radius * np.sin(tip), side[::-1]])
     axis = np.clip(height, None, 0.5 * length)
     strokes = []

@@ -54,9 +54,7 @@ def polylines_to_strokes(
         guess = _spacing(centres, chains)
         missing = ~(np.isfinite(widths) & (widths > 0))
         widths[missing] = guess
-        problems.append(
-            f"no width at {missing.sum()} stations: took {guess:.4g}, the distance between strokes"
-        )
+        problems.append(f"no width at {missing.sum()} stations: took {guess:.4g}, the distance between strokes")
     if normals is None:
         problems.append("no normals of the brush: took those of planes through the nearest stations")
         normals = _plane_normals(centres, chains)

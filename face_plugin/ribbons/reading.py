@@ -83,10 +83,7 @@ def read_sketch(path: str | os.PathLike[str], *, width: float | None = None) -> 
 def _by_length(corners: list[NDArray[np.int64]]) -> Polygons:
     lengths = np.array([len(row) for row in corners], dtype=np.int64)
     rows = [np.flatnonzero(lengths == k) for k in np.unique(lengths)]
-    return [
-        (group, np.array([corners[k] for k in group], dtype=np.int64).reshape(len(group), -1))
-        for group in rows
-    ]
+    return [(group, np.array([corners[k] for k in group], dtype=np.int64).reshape(len(group), -1)) for group in rows]
 
 
 def _ply_polygons(cloud: CloudFile) -> tuple[Polygons, NDArray[np.int64] | None]:

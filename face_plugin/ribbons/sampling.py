@@ -91,9 +91,7 @@ def sample(sketch: Sketch, n: int | None = None, *, spacing: float | None = None
     return Samples(points[kept], faces[kept], weights[kept])
 
 
-def normals_at_vertices(
-    sketch: Sketch, samples: Samples, normals: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def normals_at_vertices(sketch: Sketch, samples: Samples, normals: NDArray[np.floating]) -> NDArray[np.float64]:
     """Carry normals from the samples to the vertices of the ribbons.
 
     A vertex takes the mean of the samples in its faces, weighted by their barycentric coordinates there. The

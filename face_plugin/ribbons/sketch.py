@@ -164,9 +164,7 @@ def _note(problems: list[str], count: int, what: str) -> None:
         problems.append(f"left out {count} {what}")
 
 
-def _triangulate(
-    polygons: Polygons, count: int, problems: list[str]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _triangulate(polygons: Polygons, count: int, problems: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Fans of the polygons (f, 3), in the order of the file, and the polygon's row of each triangle."""
     parts, owners, astray, short = [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)], 0, 0
     for rows, corners in polygons:

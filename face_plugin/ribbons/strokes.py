@@ -92,9 +92,7 @@ def ribbons(strokes: Sequence[Stroke], problems: Sequence[str] = ()) -> Sketch:
     if single:
         found.append(f"left out {single} strokes of a single station")
     if not quads:
-        raise ValueError(
-            f"the sketch has no stroke of two or more stations: {'; '.join(found) or 'no strokes'}"
-        )
+        raise ValueError(f"the sketch has no stroke of two or more stations: {'; '.join(found) or 'no strokes'}")
     corners = np.concatenate(quads)
     return assemble(
         np.concatenate(vertices),

@@ -38,9 +38,7 @@ def read_ply(path: Path) -> tuple[CloudFile, list[str]]:
     after = list(promised)[list(promised).index(short) :]
     for name in after:
         count = rows if name == short else 0
-        header = re.sub(
-            rf"^(element\s+{re.escape(name)}\s+)\d+", rf"\g<1>{count}", header, flags=re.MULTILINE
-        )
+        header = re.sub(rf"^(element\s+{re.escape(name)}\s+)\d+", rf"\g<1>{count}", header, flags=re.MULTILINE)
     with tempfile.TemporaryDirectory() as folder:
         repaired = Path(folder) / path.name
         repaired.write_bytes(header.encode("ascii", "replace") + content[end:])

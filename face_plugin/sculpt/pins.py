@@ -203,9 +203,7 @@ def rim(mesh: CageMesh, joined: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 @numba.njit(cache=True)
-def _exposed(
-    tets: NDArray[np.int32], inside: NDArray[np.bool_], conducting: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _exposed(tets: NDArray[np.int32], inside: NDArray[np.bool_], conducting: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether a vertex (m,) shares a tetrahedron of one of `inside` with one that does not conduct."""
     out = np.zeros(len(inside), dtype=np.bool_)
     for t in range(len(tets)):

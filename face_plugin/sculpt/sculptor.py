@@ -244,9 +244,7 @@ def _reach(radius: ArrayLike | None, derived: NDArray[np.float64]) -> NDArray[np
         return derived
     given = np.asarray(radius, dtype=object)
     if given.shape not in ((), derived.shape):
-        raise ValueError(
-            f"radius must be one number or {len(derived)}, one a position; found shape {given.shape}"
-        )
+        raise ValueError(f"radius must be one number or {len(derived)}, one a position; found shape {given.shape}")
     given = np.broadcast_to(given, derived.shape)
     missing = np.array([one is None for one in given], dtype=np.bool_)
     radii = np.where(missing, derived, 0.0)

@@ -86,9 +86,7 @@ def from_solids(solids: Sequence[Solid], n: int, seed: int = 0, *, together: boo
         kept = evenly(points, n, rng, normals=normals)
     else:
         parts = [np.flatnonzero(owner == k) for k in range(len(solids)) if quota[k]]
-        kept = np.concatenate(
-            [p[evenly(points[p], len(p) // OVERSAMPLING, rng, normals=normals[p])] for p in parts]
-        )
+        kept = np.concatenate([p[evenly(points[p], len(p) // OVERSAMPLING, rng, normals=normals[p])] for p in parts])
     depth = np.zeros(n)
     inside = interior[kept]
     if inside.any():

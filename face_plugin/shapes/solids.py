@@ -85,9 +85,7 @@ def line(start: tuple[float, float], end: tuple[float, float]) -> Patch:
     return _revolve(start[0] + t * (end[0] - start[0]), start[1] + t * (end[1] - start[1]), normal)
 
 
-def arc(
-    centre: tuple[float, float], radius: float, start: float, end: float, *, hollow: bool = False
-) -> Patch:
+def arc(centre: tuple[float, float], radius: float, start: float, end: float, *, hollow: bool = False) -> Patch:
     """Part of a sphere or torus: a circle's arc in (radius, height), angles in radians, turned about z."""
     phi = np.linspace(start, end, _TABLE)
     outward = np.column_stack([np.cos(phi), np.sin(phi)])

@@ -129,9 +129,7 @@ class Sheets:
     """(n,) as `bulk` has it."""
 
 
-def find_sheets(
-    points: NDArray[np.float64], distance: NDArray[np.float64], neighbour: NDArray[np.intp]
-) -> Sheets:
+def find_sheets(points: NDArray[np.float64], distance: NDArray[np.float64], neighbour: NDArray[np.intp]) -> Sheets:
     """Look at the neighbours of each point, and farther where those see no other sheet.
 
     Strokes of a sketch are sampled densely and lie many spacings apart: among evenly spaced points, each `FAR_SPACING`

@@ -55,9 +55,7 @@ class Voxels:
         self.points = every[nearest_to_centres(every, self.origin, self.size)]
 
 
-def nearest_to_centres(
-    points: NDArray[np.float64], origin: NDArray[np.float64], size: float
-) -> NDArray[np.intp]:
+def nearest_to_centres(points: NDArray[np.float64], origin: NDArray[np.float64], size: float) -> NDArray[np.intp]:
     """Rows of the points (n, 3), one in each voxel that any lies in: the one nearest to its centre.
 
     Examples

@@ -137,8 +137,7 @@ def normals_of_file(
     interior = filter_interior or mark_interior
     try:
         store, timings = solve_store(
-            folder, opened, params, classify=interior, engine=engine, resume=resume, progress=progress,
-            chunk=chunk
+            folder, opened, params, classify=interior, engine=engine, resume=resume, progress=progress, chunk=chunk
         )
         report("write", 0.0)
         found = collect(store, folder)

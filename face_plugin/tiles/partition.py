@@ -86,8 +86,7 @@ def split(points: NDArray[np.float64], tiles: int) -> Partition:
 
     cut(np.arange(len(points)), tiles)
     return Partition(
-        np.array(axes, dtype=np.int64), np.array(thresholds), np.array(children, dtype=np.int64).reshape(-1,
-        2)
+        np.array(axes, dtype=np.int64), np.array(thresholds), np.array(children, dtype=np.int64).reshape(-1, 2)
     )
 
 

@@ -159,12 +159,8 @@ def _count(
 
 def _place(store: Store, source: Source, partition: Partition, chunk: int) -> None:
     """Write the points sorted by tile, and where each came from."""
-    points_out = np.lib.format.open_memmap(
-        store.folder / "points.npy", "w+", dtype=np.float64, shape=(store.count, 3)
-    )
-    rows_out = np.lib.format.open_memmap(
-        store.folder / "rows.npy", "w+", dtype=np.int64, shape=(store.count,)
-    )
+    points_out = np.lib.format.open_memmap(store.folder / "points.npy", "w+", dtype=np.float64, shape=(store.count, 3))
+    rows_out = np.lib.format.open_memmap(store.folder / "rows.npy", "w+", dtype=np.int64, shape=(store.count,))
     fill, seen = store.start[:-1].copy(), 0
     for points in _in_frame(source, store.frame, chunk):
         tile = partition.assign(points)
@@ -178,5 +174,3 @@ def _place(store: Store, source: Source, partition: Partition, chunk: int) -> No
         seen += len(points)
     points_out.flush()
     rows_out.flush()
-
-

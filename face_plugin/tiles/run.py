@@ -151,9 +151,7 @@ def solve_store(
     points = tile_size(source.count, params)
     with make_engine(engine, params, points, source.count) as running:
         if store is None:
-            fill = partial(
-                fill_store, folder, source, params, points, interior=classify, key=key, chunk=chunk
-            )
+            fill = partial(fill_store, folder, source, params, points, interior=classify, key=key, chunk=chunk)
             store, voxels = timed("cloud", fill)
             timed("coarse", lambda: _solve_coarse(voxels, params, folder))
             store.save()
@@ -178,9 +176,7 @@ def _found(folder: Path, key: str) -> Store | None:
     except FileNotFoundError:
         return None
     if store.key != key:
-        raise ValueError(
-            f"{folder} holds work on another input or with other settings: remove it, or do not resume"
-        )
+        raise ValueError(f"{folder} holds work on another input or with other settings: remove it, or do not resume")
     return store
 
 

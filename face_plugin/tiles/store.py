@@ -198,4 +198,3 @@ class Store:
         """Read it back: what is named, or all of it."""
         with np.load(self.path(tile, stage)) as arrays:
             return {name: arrays[name] for name in names or arrays.files}
-

@@ -25,9 +25,7 @@ def register(commands: Any) -> None:
         inputs="chain of steps",
         suffixes=(".toml", ".json"),
     )
-    parser.add_argument(
-        "cloud", metavar="CLOUD", type=Path, help=f"point cloud ({', '.join(CLOUD_SUFFIXES)})"
-    )
+    parser.add_argument("cloud", metavar="CLOUD", type=Path, help=f"point cloud ({', '.join(CLOUD_SUFFIXES)})")
 
 
 def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str]:

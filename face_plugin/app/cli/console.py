@@ -49,9 +49,7 @@ def guarded_stdout() -> Iterator[Callable[[str], None]]:
 class Console:
     """Progress bars, log messages and the closing summary of one run."""
 
-    def __init__(
-        self, command: str, verbose: bool, quiet: bool, as_json: bool, write: Callable[[str], None]
-    ) -> None:
+    def __init__(self, command: str, verbose: bool, quiet: bool, as_json: bool, write: Callable[[str], None]) -> None:
         self.command, self.verbose, self.quiet, self.as_json = command, verbose, quiet, as_json
         self._write = write
         self._start = time.perf_counter()

@@ -26,12 +26,8 @@ def register(commands: Any) -> None:
         output=f"cloud with normals ({', '.join(CLOUD_SUFFIXES)})",
     )
     add_interior(parser, default=False)
-    parser.add_argument(
-        "--mark-interior", action="store_true", help="write whether each point is inside (0 or 1)"
-    )
-    parser.add_argument(
-        "--scalars", action="store_true", help="write field strength and confidence of each point"
-    )
+    parser.add_argument("--mark-interior", action="store_true", help="write whether each point is inside (0 or 1)")
+    parser.add_argument("--scalars", action="store_true", help="write field strength and confidence of each point")
     parser.add_argument(
         "--resume",
         action="store_true",

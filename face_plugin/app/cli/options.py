@@ -64,13 +64,9 @@ def add_command(
     parser.add_argument("input", metavar="IN", type=Path, help=f"{inputs} ({', '.join(suffixes)})")
     if output is not None:
         parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help=output)
-    parser.add_argument(
-        "--json", action="store_true", help="print a summary as JSON, and nothing else, on stdout"
-    )
+    parser.add_argument("--json", action="store_true", help="print a summary as JSON, and nothing else, on stdout")
     volume = parser.add_mutually_exclusive_group()
-    volume.add_argument(
-        "-v", "--verbose", action="store_true", help="say more; show where an error comes from"
-    )
+    volume.add_argument("-v", "--verbose", action="store_true", help="say more; show where an error comes from")
     volume.add_argument("--quiet", action="store_true", help="say nothing but errors")
     parser.set_defaults(run=run)
     return parser
@@ -79,9 +75,7 @@ def add_command(
 def add_method(parser: argparse.ArgumentParser) -> None:
     """Add one option for each field of `Params`, with its own type, choices and description."""
     group = parser.add_argument_group("settings of the method")
-    group.add_argument(
-        "--paper", action="store_true", help="start from the settings of the paper (needs tetgen)"
-    )
+    group.add_argument("--paper", action="store_true", help="start from the settings of the paper (needs tetgen)")
     hints, texts = get_type_hints(Params), _descriptions()
     for field in dataclasses.fields(Params):
         default = "from the data" if field.default is None else field.default
@@ -133,11 +127,7 @@ def _descriptions() -> dict[str, str]:
     body = tree.body[0].body if isinstance(tree.body[0], ast.ClassDef) else []
     texts = {}
     for field, text in pairwise(body):
-        if (
-            isinstance(field, ast.AnnAssign)
-            and isinstance(field.target, ast.Name)
-            and isinstance(text, ast.Expr)
-        ):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr):
             value = text.value.value if isinstance(text.value, ast.Constant) else ""
             texts[field.target.id] = " ".join(str(value).split()).rstrip(".")
     return texts
@@ -179,9 +169,7 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the smoother variant, which does not pass through the points",
     )
-    group.add_argument(
-        "--backend", choices=BACKENDS, help="who reconstructs [default: whichever is installed]"
-    )
+    group.add_argument("--backend", choices=BACKENDS, help="who reconstructs [default: whichever is installed]")
     group.add_argument(
         "--trim",
         type=float,

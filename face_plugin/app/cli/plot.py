@@ -34,9 +34,7 @@ def register(commands: Any) -> None:
         metavar="AZ,EL",
         help="where the camera stands, degrees [default: 35,20]",
     )
-    parser.add_argument(
-        "--up", choices=("x", "y", "z"), default="z", help="the axis that points upward [default: z]"
-    )
+    parser.add_argument("--up", choices=("x", "y", "z"), default="z", help="the axis that points upward [default: z]")
     parser.add_argument(
         "--axis", choices=("x", "y", "z"), help="the axis that the slice cuts across [default: the shortest]"
     )

@@ -36,12 +36,8 @@ def register(commands: Any) -> None:
         suffixes=_SUFFIXES,
     )
     density = parser.add_mutually_exclusive_group()
-    density.add_argument(
-        "--points", type=int, metavar="N", help="points sampled on the ribbons [default: 10000]"
-    )
-    density.add_argument(
-        "--spacing", type=float, metavar="S", help="smallest distance between two points instead"
-    )
+    density.add_argument("--points", type=int, metavar="N", help="points sampled on the ribbons [default: 10000]")
+    density.add_argument("--spacing", type=float, metavar="S", help="smallest distance between two points instead")
     parser.add_argument(
         "--width", type=float, metavar="W", help="width of ribbons given by their centre lines only (OBJ)"
     )

@@ -114,9 +114,7 @@ def _heights(vertices, tets, volume):  # type: ignore[no-untyped-def]
         largest = 0.0
         for i in range(4):
             # The facet without vertex i; its own first vertex is the nearest one where it has it.
-            n = _cross(
-                vertices, tets[t, 1 if i == 0 else 0], tets[t, 2 if i < 2 else 1], tets[t, 3 if i < 3 else 2]
-            )
+            n = _cross(vertices, tets[t, 1 if i == 0 else 0], tets[t, 2 if i < 2 else 1], tets[t, 3 if i < 3 else 2])
             largest = max(largest, n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
         if largest > 0:
             out[t] = 6.0 * abs(volume[t]) / np.sqrt(largest)

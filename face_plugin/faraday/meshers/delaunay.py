@@ -131,9 +131,7 @@ def _by_scipy(points: NDArray[np.float64]) -> NDArray[np.int32]:
         return np.asarray(Delaunay(points, qhull_options="Qbb Qc Qz Q12").simplices, dtype=np.int32)
     except QhullError as error:
         reason = str(error).splitlines()[0]
-        raise MeshingError(
-            f"SciPy failed to tetrahedralise {len(points)} vertices ({reason}); {ADVICE}"
-        ) from error
+        raise MeshingError(f"SciPy failed to tetrahedralise {len(points)} vertices ({reason}); {ADVICE}") from error
 
 
 def _by_gmsh(points: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -147,9 +145,7 @@ def _by_gmsh(points: NDArray[np.float64]) -> NDArray[np.int32]:
         try:
             flat, steiner = gmsh.algorithm.tetrahedralize(guarded.ravel())
         except Exception as error:
-            raise MeshingError(
-                f"gmsh failed to tetrahedralise {len(points)} vertices ({error}); {ADVICE}"
-            ) from error
+            raise MeshingError(f"gmsh failed to tetrahedralise {len(points)} vertices ({error}); {ADVICE}") from error
     if len(steiner):
         raise MeshingError(f"gmsh added {len(steiner) // 3} vertices of its own; {ADVICE}")
     tets = np.asarray(flat).reshape(-1, 4).astype(np.int32) - 1

@@ -129,14 +129,10 @@ def check_mesh(mesh: CageMesh, balls: Balls, box: Box, *, advice: str) -> None:
     volume = tet_volumes(mesh.vertices, mesh.tets)
     expected = float(np.prod(box.upper - box.lower) - ball_volumes(balls).sum())
     if len(volume) == 0 or volume.min() <= 0:
-        raise MeshingError(
-            f"{int((volume <= 0).sum())} of {len(volume)} tetrahedra are flat or inverted; {advice}"
-        )
+        raise MeshingError(f"{int((volume <= 0).sum())} of {len(volume)} tetrahedra are flat or inverted; {advice}")
     if not np.isclose(volume.sum(), expected, rtol=VOLUME_TOLERANCE):
         share = volume.sum() / expected
-        raise MeshingError(
-            f"the tetrahedra fill {share:.6f} of the space between the box and the balls; {advice}"
-        )
+        raise MeshingError(f"the tetrahedra fill {share:.6f} of the space between the box and the balls; {advice}")
     used = np.zeros(len(mesh.vertices), dtype=np.bool_)
     used[mesh.tets] = True
     unused = int(np.count_nonzero(~used))

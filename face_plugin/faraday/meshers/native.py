@@ -44,9 +44,7 @@ def run_native(
         The child crashed, ran out of memory, or the library refused the input.
     """
     if not sys.executable:
-        raise MeshingError(
-            f"{library} runs in a process of its own, and this program names no Python interpreter"
-        )
+        raise MeshingError(f"{library} runs in a process of its own, and this program names no Python interpreter")
     with tempfile.TemporaryDirectory(prefix="face-plugin-") as folder:
         given, made = Path(folder, "in.npz"), Path(folder, "out.npz")
         np.savez(given, **arrays)  # type: ignore[arg-type]

@@ -119,13 +119,9 @@ def build_mesh(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Par
     for name in _candidates(params.mesher, len(balls.radii)):
         mesher = MESHERS[name]
         try:
-            gate.check_balls(
-                balls, spacing, box, smallest=mesher.smallest, gap=mesher.gap, clearance=mesher.clearance
-            )
+            gate.check_balls(balls, spacing, box, smallest=mesher.smallest, gap=mesher.gap, clearance=mesher.clearance)
             mesh = mesher.make(balls, spacing, box, params, _allowed_memory(params))
-            gate.check_mesh(
-                mesh, balls, box, advice="try another Params.mesher or a larger Params.cage_spacing"
-            )
+            gate.check_mesh(mesh, balls, box, advice="try another Params.mesher or a larger Params.cage_spacing")
         except MeshingError as error:
             failures.append(f"{name}: {error}")
             if params.mesher == "auto":

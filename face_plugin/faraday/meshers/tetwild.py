@@ -38,9 +38,7 @@ ENVELOPE = 1e-3
 FLATTEST = 1e-11
 # How far beyond a ball's sphere a vertex still lies on the ball, relative to its radius.
 ON_BALL = 1e-3
-ADVICE = (
-    "try Params.mesher='delaunay', or a Params.cage_spacing above the distance of points that nearly coincide"
-)
+ADVICE = "try Params.mesher='delaunay', or a Params.cage_spacing above the distance of points that nearly coincide"
 
 
 def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
@@ -78,8 +76,7 @@ def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
     require("pytetwild", extra="tetwild")
     if len(balls.radii) > PRACTICAL_BALLS:
         log.warning(
-            "fTetWild takes over half a minute for %d balls (more than %d); "
-            "a larger Params.cage_spacing makes fewer",
+            "fTetWild takes over half a minute for %d balls (more than %d); a larger Params.cage_spacing makes fewer",
             len(balls.radii),
             PRACTICAL_BALLS,
         )

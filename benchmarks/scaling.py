@@ -26,8 +26,9 @@ from typing import Any
 import numpy as np
 from clouds import teapot_with_box
 from numpy.typing import NDArray
-from plyfile import PlyData
 from scaling_report import compare, fits, plot, row
+
+from face_plugin.io.plyread import read_data
 
 SAMPLED_EVERY = 0.5
 # Where the strength is lower, the side of a point inside follows from the last digits of a shielded field.
@@ -128,7 +129,7 @@ def from_file(n: int, max_memory: float) -> str:
         start = time.perf_counter()
         _, peaks = watched([*face, "-o", str(folder / "big.ply"), "--max-memory", str(max_memory)])
         seconds = time.perf_counter() - start
-        vertex = PlyData.read(str(folder / "big.ply"))["vertex"]
+        vertex = read_data(folder / "big.ply", mapped=True)["vertex"].data
         normals = np.stack([vertex[axis] for axis in ("nx", "ny", "nz")], axis=1)
         with np.load(folder / "truth.npz") as arrays:
             right = np.einsum("ij,ij->i", normals, arrays["normals"])[~arrays["interior"]] > 0

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import itertools
+import logging
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -196,6 +198,25 @@ def test_where_the_methods_differ() -> None:
     for method in METHODS:
         assert inside(deep, *nested, method).all()
         assert not inside(deep, *turned, method).any()
+
+
+def test_winding_number_answers_where_there_is_no_embree(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    monkeypatch.setitem(sys.modules, "embreex", None)
+    monkeypatch.delitem(sys.modules, "embreex.rtcore_scene", raising=False)
+    module._embree_loads.cache_clear()
+    try:
+        with caplog.at_level(logging.INFO, logger="face_plugin"):
+            for _ in range(2):
+                answer = inside_by_rays([[0.1, 0.1, 0.1], [0.4, 0.4, 0.4]], corners, faces)
+                assert answer.tolist() == [True, False]
+    finally:
+        module._embree_loads.cache_clear()
+    told = [record.levelno for record in caplog.records if "embreex" in record.getMessage()]
+    assert told == [logging.INFO]
 
 
 def test_bad_arguments_are_named() -> None:

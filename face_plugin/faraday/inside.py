@@ -17,6 +17,8 @@ surface, about 1e-6 of its extent. They differ
 
 from __future__ import annotations
 
+import logging
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +28,8 @@ from face_plugin.faraday.isosurface import fill_balls, isosurface
 from face_plugin.faraday.meshers import CageMesh
 
 __all__ = ["inside", "inside_by_rays", "inside_by_winding", "shielded"]
+
+log = logging.getLogger(__name__)
 
 _ROUNDS = 3
 """How often rays are cast, at most, from a point whose vote is undecided."""
@@ -137,7 +141,8 @@ def inside_by_rays(
     Notes
     -----
     Takes the place of the winding number in section 3.4 of the paper; exact but for single precision, in
-    which Embree works, and faster. Coordinates are centred and scaled first.
+    which Embree works, and faster. Coordinates are centred and scaled first. Where there is no Embree (its
+    package has no wheel for Linux on ARM) the winding number answers, which is said once in the log.
 
     Examples
     --------
@@ -150,6 +155,8 @@ def inside_by_rays(
         raise ValueError(f"directions: at least 1 is needed, got {directions}")
     queries, corners, faces = _checked(points, v, f)
     queries, corners = _unit_box(queries, corners, faces)
+    if not _embree_loads():
+        return inside_by_winding(points, v, f)
     result = np.zeros(len(queries), dtype=bool)
     single = corners.astype(np.float32)
     normals = _normals(single, faces)
@@ -219,6 +226,16 @@ def inside_by_winding(points: ArrayLike, v: ArrayLike, f: ArrayLike, *, threshol
     function = getattr(igl, "fast_winding_number", None) or igl.fast_winding_number_for_meshes
     number: NDArray[np.float64] = np.ravel(function(corners, faces, queries))
     return number > threshold
+
+
+@cache
+def _embree_loads() -> bool:
+    try:
+        import embreex.rtcore_scene  # noqa: F401
+    except (ImportError, OSError) as error:
+        log.info("embreex cannot be loaded (%s): the winding number tells what is inside", error)
+        return False
+    return True
 
 
 class _Rays:

@@ -1,4 +1,4 @@
-"""Point clouds and meshes on disk: PLY, OBJ, XYZ/TXT/CSV, NPY/NPZ, LAS/LAZ in; the same, STL and OFF out.
+"""Point clouds and meshes on disk: what can be read is in `READ_SUFFIXES`, what is written in the other two.
 
 Every file is written under another name in the same folder and then renamed: what stands under the wanted
 name is always whole.
@@ -7,6 +7,7 @@ name is always whole.
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,6 +20,7 @@ from face_plugin.io.cloudfile import Array, CloudFile, replacing
 __all__ = [
     "CLOUD_SUFFIXES",
     "MESH_SUFFIXES",
+    "READ_SUFFIXES",
     "CloudFile",
     "check_output",
     "read_cloud",
@@ -26,9 +28,10 @@ __all__ = [
     "write_mesh",
 ]
 
-_TEXT = (".xyz", ".xyzn", ".txt", ".csv", ".asc", ".pts")
-_READERS = {
+_TEXT = (".xyz", ".xyzn", ".xyzrgb", ".txt", ".csv", ".asc", ".pts")
+_MODULES = {
     ".ply": "ply",
+    ".pcd": "pcd",
     ".obj": "obj",
     **dict.fromkeys(_TEXT, "text"),
     ".npy": "arrays",
@@ -36,8 +39,14 @@ _READERS = {
     ".las": "las",
     ".laz": "las",
 }
-CLOUD_SUFFIXES = tuple(_READERS)
+_READERS = {**_MODULES, ".e57": "e57", ".ptx": "ptx", ".off": "off", ".stl": "stl"}
+READ_SUFFIXES = tuple(_READERS)
+"""Extensions of the files that can be read."""
+CLOUD_SUFFIXES = tuple(_MODULES)
+"""Extensions of the clouds that can be written."""
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
+"""Extensions of the meshes that can be written."""
+log = logging.getLogger(__name__)
 
 
 def _suffix(path: Path, allowed: tuple[str, ...]) -> str:
@@ -82,14 +91,18 @@ def check_output(path: str | os.PathLike[str], allowed: tuple[str, ...]) -> Path
     return path
 
 
-def read_cloud(path: str | os.PathLike[str]) -> CloudFile:
+def read_cloud(path: str | os.PathLike[str], *, strict: bool = True) -> CloudFile:
     """Read a point cloud; the extension tells the format.
 
     Parameters
     ----------
     path : path
-        PLY (ascii or binary of either byte order), OBJ, XYZ/XYZN/TXT/CSV/ASC/PTS (any delimiter, with or
-        without column names), NPY, NPZ, or LAS/LAZ (extra ``las``).
+        PLY (ascii or binary of either byte order), PCD, OBJ, XYZ/XYZN/XYZRGB/TXT/CSV/ASC/PTS (any delimiter,
+        with or without column names, decimal points or commas), NPY, NPZ, LAS, LAZ and COPC (extra ``las``),
+        E57 (extra ``e57``), PTX, OFF, or STL.
+    strict : bool
+        Refuse faces and lines that name a vertex which is not there, and log `CloudFile.problems` as warnings.
+        False leaves both to the caller.
 
     Returns
     -------
@@ -103,7 +116,7 @@ def read_cloud(path: str | os.PathLike[str]) -> CloudFile:
     OSError
         The file cannot be opened.
     MissingDependencyError
-        LAS/LAZ without laspy.
+        LAS/LAZ without laspy, E57 without pye57.
 
     Examples
     --------
@@ -114,9 +127,15 @@ def read_cloud(path: str | os.PathLike[str]) -> CloudFile:
     3
     """
     path = Path(path)
-    suffix = _suffix(path, CLOUD_SUFFIXES)
+    suffix = _suffix(path, READ_SUFFIXES)
     module = importlib.import_module(f"face_plugin.io.{_READERS[suffix]}")
-    return cast(CloudFile, module.read(path))
+    cloud = cast(CloudFile, module.read(path))
+    if strict:
+        if hasattr(module, "check"):
+            module.check(path, cloud)
+        for problem in cloud.problems:
+            log.warning("%s: %s", path, problem)
+    return cloud
 
 
 def write_cloud(
@@ -135,7 +154,7 @@ def write_cloud(
     Parameters
     ----------
     path : path
-        Extension as in `read_cloud`.
+        One of `CLOUD_SUFFIXES`.
     cloud : CloudFile
         What was read, or ``CloudFile(points)``.
     normals : (n, 3) array, optional

@@ -2,56 +2,130 @@
 
 from __future__ import annotations
 
+import logging
+import zipfile
 from collections.abc import Mapping
+from io import BufferedReader
 from pathlib import Path
-from zipfile import BadZipFile
+from typing import IO, Any
 
 import numpy as np
 
 from face_plugin.io.cloudfile import Array, CloudFile, columns, malformed
+from face_plugin.io.names import NORMAL, POINT, guess_names, meanings
 
+log = logging.getLogger(__name__)
+
+# Packed numbers rarely shrink to less; what unpacks to more than this many times the file is told.
+_USUAL_RATIO = 20
 _POINT_KEYS = ("points", "vertices", "xyz", "positions", "pos", "coords")
 
 
 def read(path: Path) -> CloudFile:
     """Read an NPY or NPZ file; see `face_plugin.io.read_cloud`."""
+    kind = path.suffix[1:].upper()
     try:
-        loaded = np.load(path, allow_pickle=False)
-        arrays = (
-            {key: loaded[key] for key in loaded.files} if isinstance(loaded, np.lib.npyio.NpzFile) else None
-        )
-    except (ValueError, EOFError, BadZipFile, KeyError) as error:
-        raise malformed(path, path.suffix[1:].upper(), error) from error
-    if arrays is not None:
-        return _from_npz(path, arrays)
+        if path.suffix.lower() == ".npz":
+            return _from_npz(path, _members(path))
+        with open(path, "rb") as stream:
+            loaded = _load(stream, path.stat().st_size)
+    except (ValueError, EOFError, KeyError, OverflowError, MemoryError, zipfile.BadZipFile) as error:
+        if str(error).startswith(f"{path}: "):
+            raise
+        raise malformed(path, kind, error) from error
     if loaded.dtype.names is not None:
         return _from_records(path, loaded)
-    if loaded.ndim != 2 or loaded.shape[1] < 3 or loaded.dtype.kind not in "fiu":
-        found = (
-            f"{loaded.dtype} array of shape {loaded.shape}, expected numbers of shape (n, 3) or more columns"
-        )
-        raise malformed(path, "NPY", found)
-    # Columns 4 to 6 of an array are its normals by common use; more are kept under their number.
-    has_normals = loaded.shape[1] >= 6
-    rest = range(6 if has_normals else 3, loaded.shape[1])
+    check_table(path, loaded)
+    names = array_names(loaded)
+    has_normals = all(n in names for n in NORMAL)
     return CloudFile(
         points=loaded[:, :3],
         normals=loaded[:, 3:6] if has_normals else None,
-        attributes={f"column_{k + 1}": loaded[:, k] for k in rest},
+        attributes={name: loaded[:, k] for k, name in enumerate(names) if name not in POINT + NORMAL},
         suffix=".npy",
     )
 
 
+def _load(stream: IO[bytes], size: int) -> Array:
+    """Read one array, after its header was held against the bytes that there are."""
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, fortran, dtype = read(stream)
+    if dtype.hasobject:
+        raise ValueError("it holds Python objects, which are not loaded")
+    count = 1
+    for length in shape:
+        count *= length
+    if min(shape, default=0) < 0 or count * dtype.itemsize > size:
+        raise ValueError(f"its header claims {dtype} of shape {shape}, but the file has {size} bytes")
+    if isinstance(stream, BufferedReader):
+        flat = np.fromfile(stream, dtype=dtype, count=count) if dtype.itemsize else np.empty(count, dtype)
+    else:
+        flat = np.frombuffer(bytearray(stream.read(count * dtype.itemsize)), dtype=dtype)
+    if len(flat) < count:
+        raise ValueError(f"its header claims {dtype} of shape {shape}, but only {len(flat)} values follow")
+    return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
+
+
+def _members(path: Path) -> dict[str, Array]:
+    """Arrays of an archive; what is no array is left out."""
+    arrays: dict[str, Array] = {}
+    with zipfile.ZipFile(path) as archive:
+        unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked > _USUAL_RATIO * path.stat().st_size:
+            log.warning(
+                "%s: unpacks to %.3g MB, %d times its size", path, unpacked / 1e6, unpacked // path.stat().st_size
+            )
+        for entry in archive.infolist():
+            if not entry.filename.endswith(".npy"):
+                continue
+            try:
+                with archive.open(entry) as stream:
+                    arrays[entry.filename[:-4]] = _load(stream, entry.file_size)
+            except (NotImplementedError, RuntimeError) as error:
+                raise ValueError(f"member {entry.filename!r}: {error}") from error
+            except zipfile.BadZipFile:
+                raise
+            except Exception as error:
+                # What zlib and NumPy raise on a damaged member; named, because there are others.
+                raise ValueError(f"member {entry.filename!r}: {error}") from error
+    return arrays
+
+
+def check_table(path: Path, loaded: Array) -> None:
+    """Raise ValueError unless an array has three columns of numbers or more."""
+    if loaded.ndim != 2 or loaded.shape[1] < 3 or loaded.dtype.kind not in "fiu":
+        found = f"{loaded.dtype} array of shape {loaded.shape}"
+        raise malformed(path, "NPY", f"{found}, expected numbers of shape (n, 3) or more columns")
+
+
+def array_names(loaded: Array) -> list[str]:
+    """Name the columns of an array: 4 to 6 are normals by common use, unless they are bytes of colours."""
+    names = guess_names([loaded[:, k] for k in range(loaded.shape[1])])
+    if loaded.shape[1] >= 6 and names[3:6] == ["column_4", "column_5", "column_6"]:
+        names[3:6] = NORMAL
+    return names
+
+
+def check_records(path: Path, dtype: np.dtype[Any], shape: tuple[int, ...]) -> dict[str, str]:
+    """Return the fields of records by their meaning; ValueError unless x, y, z are numbers."""
+    names = dtype.names or ()
+    found = meanings(names)
+    wrong = [axis for axis in POINT if axis not in found or dtype[found[axis]].kind not in "fiu"]
+    if wrong or len(shape) != 1:
+        fields = {name: str(dtype[name]) for name in names}
+        raise malformed(path, "NPY", f"records of shape {shape} with {fields}, expected numbers x, y, z")
+    return found
+
+
 def _from_records(path: Path, loaded: Array) -> CloudFile:
-    names = loaded.dtype.names or ()
-    if any(axis not in names for axis in "xyz") or loaded.ndim != 1:
-        raise malformed(path, "NPY", f"records of shape {loaded.shape} with {list(names)}, expected x, y, z")
-    has_normals = all(name in names for name in ("nx", "ny", "nz"))
-    used = {"x", "y", "z", *(("nx", "ny", "nz") if has_normals else ())}
+    found = check_records(path, loaded.dtype, loaded.shape)
+    has_normals = all(n in found and loaded.dtype[found[n]].kind in "fiu" for n in NORMAL)
+    used = {found[n] for n in (*POINT, *(NORMAL if has_normals else ()))}
     return CloudFile(
-        points=np.stack([loaded[axis] for axis in "xyz"], axis=1),
-        normals=np.stack([loaded[name] for name in ("nx", "ny", "nz")], axis=1) if has_normals else None,
-        attributes={name: loaded[name] for name in names if name not in used},
+        points=np.stack([loaded[found[n]] for n in POINT], axis=1),
+        normals=np.stack([loaded[found[n]] for n in NORMAL], axis=1) if has_normals else None,
+        attributes={name: loaded[name] for name in loaded.dtype.names or () if name not in used},
         suffix=".npy",
         source="records",
     )
@@ -64,11 +138,14 @@ def _from_npz(path: Path, arrays: dict[str, Array]) -> CloudFile:
     if not found:
         raise malformed(path, "NPZ", f"no array 'points' of shape (n, 3), but {shapes}")
     points = arrays[found[0]]
+    if points.dtype.names is not None:
+        cloud = _from_records(path, points)
+        return CloudFile(cloud.points, cloud.normals, cloud.attributes, ".npz")
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
-        raise malformed(
-            path, "NPZ", f"{found[0]!r} is {points.dtype} of shape {points.shape}, expected (n, 3)"
-        )
+        raise malformed(path, "NPZ", f"{found[0]!r} is {points.dtype} of shape {points.shape}, expected (n, 3)")
     normals = arrays.get("normals")
+    if normals is not None and (normals.shape != points.shape or normals.dtype.kind not in "fiu"):
+        normals = None
     attributes = {
         key: values
         for key, values in arrays.items()
@@ -76,16 +153,14 @@ def _from_npz(path: Path, arrays: dict[str, Array]) -> CloudFile:
     }
     return CloudFile(
         points=points,
-        normals=normals if normals is not None and normals.shape == points.shape else None,
+        normals=normals,
         attributes=attributes,
         suffix=".npz",
         source=(found[0], arrays),
     )
 
 
-def write(
-    path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None
-) -> None:
+def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None) -> None:
     """Write an NPY or NPZ file; see `face_plugin.io.write_cloud`."""
     if path.suffix.lower() == ".npz":
         key, arrays = cloud.source if cloud.suffix == ".npz" and cloud.source else ("points", {})
@@ -98,15 +173,23 @@ def write(
         return
     points, normals, attributes = columns(cloud, normals, extra, keep)
     if cloud.source == "records":
-        named = {axis: points[:, k] for k, axis in enumerate("xyz")}
+        named = {axis: points[:, k] for k, axis in enumerate(POINT)}
         if normals is not None:
-            named.update({name: normals[:, k] for k, name in enumerate(("nx", "ny", "nz"))})
+            named.update({name: normals[:, k] for k, name in enumerate(NORMAL)})
         named.update(attributes)
         records = np.empty(len(points), dtype=[(name, values.dtype) for name, values in named.items()])
         for name, values in named.items():
             records[name] = values
-        np.save(path, records, allow_pickle=False)
+        _save(path, records)
         return
     blocks = [points] if normals is None else [points, normals]
     blocks += [values[:, None] for values in attributes.values() if values.dtype.kind in "fiub"]
-    np.save(path, np.concatenate(blocks, axis=1), allow_pickle=False)
+    _save(path, np.concatenate(blocks, axis=1))
+
+
+def _save(path: Path, array: Array) -> None:
+    """Write an array; unlike `numpy.save`, with the system's own words where the disk is full."""
+    array = np.ascontiguousarray(array)
+    with open(path, "wb") as stream:
+        np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(array))
+        stream.write(array.reshape(-1).view(np.uint8).data)

@@ -33,6 +33,10 @@ class CloudFile:
         Every other value a point has (colour, intensity, label, ...), as it stands in the file.
     suffix : str
         Extension of the file it was read from, lower case with its dot.
+    viewpoints : (k, 3) float64 array or None
+        Where the scanner stood, in the frame and unit of the points, where the file says so.
+    problems : tuple of str
+        What was left out because it could not be read.
     source : object
         What the format's writer needs to keep the rest (faces, comments, byte order). Not for users.
 
@@ -47,6 +51,8 @@ class CloudFile:
     normals: Array | None = None
     attributes: Mapping[str, Array] = field(default_factory=dict)
     suffix: str = ""
+    viewpoints: NDArray[np.float64] | None = None
+    problems: tuple[str, ...] = ()
     source: Any = field(default=None, repr=False)
 
     def __len__(self) -> int:
@@ -75,6 +81,16 @@ def replacing(path: Path) -> Iterator[Path]:
         if target.exists():
             shutil.copymode(target, temporary)
         os.replace(temporary, target)
+    except OSError as error:
+        if error.filename not in (None, str(temporary)):
+            raise
+        # A full disk names no file at all, and of the temporary one nobody has heard.
+        reason = error.strerror or str(error)
+        if not target.parent.is_dir():
+            reason = f"there is no folder {target.parent}"
+        if error.errno is None:
+            raise OSError(f"{path}: cannot be written: {reason}") from error
+        raise OSError(error.errno, reason, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from face_plugin.errors import require
 from face_plugin.io.cloudfile import Array, CloudFile, columns, malformed
+from face_plugin.io.lascheck import check_las
+from face_plugin.io.names import COLOUR, with_colours
 
 # The names under which PDAL and CloudCompare keep normals in extra bytes.
 _NORMAL = ("NormalX", "NormalY", "NormalZ")
@@ -20,6 +22,7 @@ def read(path: Path) -> CloudFile:
     """Read a LAS or LAZ file; see `face_plugin.io.read_cloud`."""
     laspy = require("laspy", extra="las")
     try:
+        check_las(path)
         las = laspy.read(str(path))
         points = np.ascontiguousarray(las.xyz)
     except OSError:
@@ -40,19 +43,20 @@ def read(path: Path) -> CloudFile:
     )
 
 
-def write(
-    path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None
-) -> None:
+def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None) -> None:
     """Write a LAS or LAZ file; see `face_plugin.io.write_cloud`."""
     laspy = require("laspy", extra="las")
     points, normals, attributes = columns(cloud, normals, extra, keep)
     if isinstance(cloud.source, laspy.LasData):
         # Indexing copies header and points.
         las = cloud.source[np.ones(len(cloud), dtype=bool) if keep is None else keep]
+        # The octree of a COPC file names places in that file.
+        las.header.vlrs = [vlr for vlr in las.header.vlrs if vlr.user_id != "copc"]
+        las.evlrs = [vlr for vlr in las.evlrs or [] if vlr.user_id != "copc"] or None
         new = {name: values for name, values in attributes.items() if name in extra}
     else:
         las = _fresh(laspy, points)
-        new = attributes
+        new = attributes if _has_wide_colours(attributes) else with_colours(attributes)
     if normals is not None:
         new = {**new, **{name: normals[:, k].astype(np.float32) for k, name in enumerate(_NORMAL)}}
     present = set(las.point_format.dimension_names)
@@ -66,8 +70,12 @@ def write(
     present = set(las.point_format.dimension_names)
     for name, values in new.items():
         if name[:32] in present:
-            las[name[:32]] = _colour(values) if name in ("red", "green", "blue") else values
+            las[name[:32]] = _colour(values) if name in COLOUR else values
     las.write(str(path))
+
+
+def _has_wide_colours(attributes: Mapping[str, Array]) -> bool:
+    return all(name in attributes and attributes[name].dtype == np.uint16 for name in COLOUR)
 
 
 def _colour(values: Array) -> Array:

@@ -8,22 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from face_plugin.io.cloudfile import Array, format_column, interleave
+from face_plugin.io.plydata import PlyData
+from face_plugin.io.plywrite import element, write_data
+from face_plugin.io.stl import STL_FACET
 
 __all__ = ["WRITERS"]
 
-_STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-
 
 def _ply(path: Path, vertices: Array, faces: Array, normals: Array | None, more: Mapping[str, Array]) -> None:
-    from plyfile import PlyData
-
-    from face_plugin.io.ply import element, write_elements
-
     columns = {"x": vertices[:, 0], "y": vertices[:, 1], "z": vertices[:, 2]}
     if normals is not None:
         columns.update({"nx": normals[:, 0], "ny": normals[:, 1], "nz": normals[:, 2]})
     parts = [element("vertex", {**columns, **more}), element("face", {"vertex_indices": faces.astype("i4")})]
-    write_elements(path, PlyData(parts, byte_order="<"))
+    write_data(path, PlyData(parts))
 
 
 def _rows(values: Array, prefix: str = "") -> str:
@@ -44,7 +41,7 @@ def _stl(path: Path, vertices: Array, faces: Array, normals: Array | None, more:
     corners = vertices[faces].astype(np.float64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(cross, axis=1, keepdims=True)
-    facets = np.zeros(len(faces), dtype=_STL_FACET)
+    facets = np.zeros(len(faces), dtype=STL_FACET)
     facets["normal"] = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
     facets["corners"] = corners
     with open(path, "wb") as stream:

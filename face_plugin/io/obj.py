@@ -8,16 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from face_plugin.io.cloudfile import Array, CloudFile, columns, format_column, interleave, malformed
-
-_COLOUR = ("red", "green", "blue")
+from face_plugin.io.dialect import decoded
+from face_plugin.io.names import COLOUR, with_colours
 
 
 def read(path: Path) -> CloudFile:
     """Read an OBJ file; see `face_plugin.io.read_cloud`."""
-    try:
-        lines = path.read_text(encoding="utf-8").replace("\\\n", " ").splitlines()
-    except UnicodeDecodeError as error:
-        raise malformed(path, "OBJ", f"not text: {error}") from error
+    lines = decoded(path, "OBJ").replace("\r\n", "\n").replace("\\\n", " ").splitlines()
     points = _table(path, lines, "v")
     if points is None:
         raise malformed(path, "OBJ", "no line 'v x y z'")
@@ -27,10 +24,29 @@ def read(path: Path) -> CloudFile:
         points=np.ascontiguousarray(points[:, :3]),
         # Fewer or more normals than points belong to corners of faces, not to points.
         normals=normals[:, :3] if normals is not None and len(normals) == len(points) else None,
-        attributes={name: points[:, 3 + k] for k, name in enumerate(_COLOUR)} if coloured else {},
+        attributes={name: points[:, 3 + k] for k, name in enumerate(COLOUR)} if coloured else {},
         suffix=".obj",
         source=lines,
     )
+
+
+def check(path: Path, cloud: CloudFile) -> None:
+    """Raise ValueError where a face, line or point names a vertex that is not there yet, or nothing."""
+    seen = 0
+    for number, line in enumerate(cloud.source, 1):
+        keyword = _keyword(line)
+        if keyword == "v":
+            seen += 1
+        elif keyword in ("f", "l", "p"):
+            for word in line.split("#")[0].split()[1:]:
+                try:
+                    index = int(word.split("/")[0])
+                except ValueError:
+                    raise malformed(path, "OBJ", f"line {number}: {word[:40]!r} is no vertex") from None
+                # Counted from 1, or backwards from the last; some write faces before their vertices.
+                if not (1 <= index <= len(cloud) or -seen <= index <= -1):
+                    found = f"line {number} names vertex {index} of {len(cloud)} (counted from 1)"
+                    raise malformed(path, "OBJ", found)
 
 
 def _keyword(line: str) -> str:
@@ -62,16 +78,15 @@ def _table(path: Path, lines: list[str], keyword: str) -> Array | None:
     return table
 
 
-def write(
-    path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None
-) -> None:
+def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None) -> None:
     """Write an OBJ file; see `face_plugin.io.write_cloud`. OBJ has no place for `extra`."""
     points, normals, attributes = columns(cloud, normals, {}, keep)
+    attributes = with_colours(attributes)
     with open(path, "w", encoding="utf-8", newline="\n") as stream:
         if not isinstance(cloud.source, list):
             cols = [points[:, k] for k in range(3)]
-            if all(name in attributes for name in _COLOUR):
-                cols += [_unit_colour(attributes[name]) for name in _COLOUR]
+            if all(name in attributes for name in COLOUR):
+                cols += [_unit_colour(attributes[name]) for name in COLOUR]
             stream.write(interleave([format_column(column) for column in cols], " ", "v "))
             stream.write(_normal_lines(normals))
         else:
@@ -107,7 +122,8 @@ def _rewrite(lines: list[str], count: int, normals: Array | None, keep: Array | 
                 out.extend(_normal_lines(normals).splitlines())
         elif keyword in ("f", "l", "p"):
             words = [
-                _corner(word, seen, new, keyword == "f" and normals is not None) for word in line.split()[1:]
+                _corner(word, seen, new, keyword == "f" and normals is not None)
+                for word in line.split("#")[0].split()[1:]
             ]
             if all(words):
                 out.append(" ".join([keyword, *words]))

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import require
-from face_plugin.io import ply as ply_format
 from face_plugin.io.las import _NORMAL as _LAS_NORMAL
 from face_plugin.io.las import _colour, _fresh
+from face_plugin.io.plydata import PlyData
+from face_plugin.io.plywrite import binary_rows, element
 from face_plugin.io.sources import LasSource, Source
 
 __all__ = ["WRITERS"]
@@ -46,8 +47,6 @@ def _npy(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
 
 def _ply(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
     """Write a binary little-endian PLY with one element."""
-    from plyfile import PlyData, PlyElement
-
     with open(path, "wb") as stream:
         for k, part in enumerate(parts):
             # The type of a wide integer must not hang on the values of one part.
@@ -55,11 +54,10 @@ def _ply(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
                 name: values.astype(np.float64) if values.dtype in (np.int64, np.uint64) else values
                 for name, values in part.items()
             }
-            element = ply_format.element("vertex", narrow)
+            vertex = element("vertex", narrow)
             if k == 0:
-                whole = PlyElement("vertex", element.properties, count, [])
-                stream.write(PlyData([whole], byte_order="<").header.encode("ascii", "replace") + b"\n")
-            stream.write(element.data.astype(element.data.dtype.newbyteorder("<")).tobytes())
+                stream.write(PlyData([vertex]).header_for({"vertex": count}).encode("ascii", "replace"))
+            stream.write(binary_rows(vertex, "<").data)
 
 
 def _las(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import require
+from face_plugin.io.arrays import check_records, check_table
 from face_plugin.io.cloudfile import malformed
+from face_plugin.io.lascheck import check_las
 
 __all__ = ["STREAMED", "ArraySource", "LasSource", "Source", "open_source"]
 
@@ -70,11 +72,12 @@ class ArraySource:
 class _RecordSource:
     """Records with x, y, z in a memory map."""
 
-    def __init__(self, path: Path, records: NDArray[Any]) -> None:
+    def __init__(self, path: Path, records: NDArray[Any], names: dict[str, str]) -> None:
         self.path = path
         self.records = records
         self.count = len(records)
-        self.dtype = np.dtype(records.dtype["x"].newbyteorder("="))
+        self._axes = [names[axis] for axis in "xyz"]
+        self.dtype = np.dtype(records.dtype[self._axes[0]].newbyteorder("="))
 
     def parts(self, size: int = CHUNK) -> Iterator[Part]:
         """Yield the points in their order, `size` at a time."""
@@ -82,7 +85,7 @@ class _RecordSource:
             # A copy: fields of a memory map are read from disk each time they are touched.
             records = np.array(self.records[start : start + size])
             values = {name: _native(records[name]) for name in records.dtype.names or ()}
-            yield np.stack([values.pop(axis) for axis in "xyz"], axis=1), values
+            yield np.stack([values.pop(axis) for axis in self._axes], axis=1), values
 
     def digest(self) -> str:
         """Hash of the file."""
@@ -96,6 +99,7 @@ class LasSource:
         self.path = path
         self._laspy: Any = require("laspy", extra="las")
         try:
+            check_las(path)
             with self._laspy.open(str(path)) as reader:
                 self.count = int(reader.header.point_count)
                 self.names = list(reader.header.point_format.dimension_names)
@@ -111,8 +115,7 @@ class LasSource:
         with self._laspy.open(str(self.path)) as reader:
             for records in reader.chunk_iterator(size):
                 points = np.stack([np.asarray(records[axis]) for axis in "xyz"], axis=1)
-                yield points, {name: np.asarray(records[name]) for name in self.names if name not in ("X",
-                "Y", "Z")}
+                yield points, {name: np.asarray(records[name]) for name in self.names if name not in ("X", "Y", "Z")}
 
     def digest(self) -> str:
         """Hash of the file."""
@@ -157,31 +160,26 @@ def open_source(path: Path) -> Source:
 def _open_npy(path: Path) -> Source:
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError) as error:
+    except (ValueError, EOFError, OverflowError) as error:
         raise malformed(path, "NPY", error) from error
-    if array.dtype.names is not None and {"x", "y", "z"} <= set(array.dtype.names) and array.ndim == 1:
-        return _RecordSource(path, array)
-    if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
-        found = f"{array.dtype} array of shape {array.shape}"
-        raise malformed(path, "NPY", f"{found}, expected numbers of shape (n, 3) or more columns")
+    if array.dtype.names is not None:
+        return _RecordSource(path, array, check_records(path, array.dtype, array.shape))
+    check_table(path, array)
     # Columns 4 to 6 of an array are its normals by common use, which the new ones replace.
     rest = range(6 if array.shape[1] >= 6 else 3, array.shape[1])
     return ArraySource(array[:, :3], {f"column_{k + 1}": array[:, k] for k in rest})
 
 
 def _open_ply(path: Path) -> Source:
-    from plyfile import PlyData, PlyParseError
+    from face_plugin.io.ply import vertices
+    from face_plugin.io.plyread import read_data
 
     try:
-        # Without lists, plyfile maps a binary element into memory; the faces of a mesh it would read at
-        # once.
-        data = PlyData.read(str(path), known_list_len={"face": {"vertex_indices": 3, "vertex_index": 3}})
-        vertex = data["vertex"].data
-    except (PlyParseError, ValueError, KeyError, OverflowError) as error:
+        data = read_data(path, mapped=True)
+        vertex, found = vertices(data)
+    except (ValueError, OverflowError) as error:
         raise malformed(path, "PLY", error) from error
-    if not {"x", "y", "z"} <= set(vertex.dtype.names):
-        raise malformed(path, "PLY", f"'vertex' has no x, y, z, but {list(vertex.dtype.names)}")
-    return _RecordSource(path, vertex)
+    return _RecordSource(path, vertex.data, found)
 
 
 def _native(values: NDArray[Any]) -> NDArray[Any]:

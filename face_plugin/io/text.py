@@ -1,148 +1,89 @@
-"""Points in columns of text: XYZ, TXT, CSV, ASC, PTS; delimiter and column names are found out."""
+"""Points in columns of text: XYZ, TXT, CSV, ASC, PTS; see `dialect` for how their layout is found out."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from face_plugin.io.cloudfile import Array, CloudFile, columns, format_column, interleave, malformed
-
-_POINT = ("x", "y", "z")
-_NORMAL = ("nx", "ny", "nz")
-_ALIASES = {
-    **{f"normal_{axis}": f"n{axis}" for axis in "xyz"},
-    **{f"normal{axis}": f"n{axis}" for axis in "xyz"},
-    **{f"n_{axis}": f"n{axis}" for axis in "xyz"},
-}
-_COMMENT = ("#", "//", ";;")
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """How the lines of a file look, so that it can be written alike."""
-
-    delimiter: str | None
-    head: tuple[str, ...]
-    """Lines before the data as they stand, the one with the column names left out."""
-    names: tuple[str, ...]
-    """Name of each column, in the file's order."""
-    header: str | None
-    """What stands before the column names ('' or a comment sign), or None where the file has no names."""
-    counted: bool
-    """The first line is the number of points (PTS)."""
+from face_plugin.io.dialect import Layout, Sheet, is_number, open_sheet, split
+from face_plugin.io.names import COLOUR, NORMAL, POINT, guess_names, meanings, with_colours
 
 
 def read(path: Path) -> CloudFile:
     """Read a text file of points; see `face_plugin.io.read_cloud`."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise malformed(path, "text", f"not text: {error}") from error
-    start, head = 0, []
-    while start < len(lines) and (not lines[start].strip() or lines[start].lstrip().startswith(_COMMENT)):
-        head.append(lines[start])
-        start += 1
-    counted = start + 1 < len(lines) and lines[start].strip().isdigit()
-    start += counted
-    if start == len(lines):
-        raise malformed(path, "text", "no line with coordinates")
-    delimiter = next((d for d in (",", ";", "\t") if d in lines[start]), None)
-    first = _split(lines[start], delimiter)
-    names, header = None, None
-    if not _is_number(first[0]):
-        names, header, start = first, "", start + 1
-        if start == len(lines):
-            raise malformed(path, "text", f"no line after the column names {first}")
-        first = _split(lines[start], delimiter)
-    elif head:
-        sign = re.match(r"\s*(#+|//|;;)\s*", head[-1])
-        commented = _split(head[-1][sign.end() :], delimiter) if sign else []
-        if sign and len(commented) == len(first) and {"x", "y", "z"} <= {_plain(n) for n in commented}:
-            names, header = commented, sign.group(0)
-            head.pop()
-    table = _parse(path, lines, start, delimiter, len(first))
-    if names is None:
-        names = _guess_names(table)
-    elif len(names) != len(table):
-        raise malformed(path, "text", f"{len(names)} column names for {len(table)} columns")
-    plain = [_plain(name) for name in names]
-    missing = [axis for axis in _POINT if axis not in plain]
-    if missing or any(table[plain.index(axis)].dtype.kind not in "fiu" for axis in _POINT):
-        raise malformed(path, "text", f"columns {list(names)}: no numbers under x, y, z")
-    has_normals = all(n in plain and table[plain.index(n)].dtype.kind in "fiu" for n in _NORMAL)
-    used = _POINT + (_NORMAL if has_normals else ())
+    sheet = open_sheet(path)
+    suffix = path.suffix.lower()
+    table = _parse(path, sheet)
+    layout = sheet.layout
+    names = list(layout.names) or guess_names(table, suffix=suffix)
+    found = meanings(names)
+    at = {meaning: names.index(name) for meaning, name in found.items()}
+    if any(axis not in at or table[at[axis]].dtype.kind not in "fiu" for axis in POINT):
+        raise malformed(path, "text", f"columns {names}: no numbers under x, y, z")
+    has_normals = all(n in at and table[at[n]].dtype.kind in "fiu" for n in NORMAL)
+    used = {at[n] for n in (*POINT, *(NORMAL if has_normals else ()))}
+    layout = Layout(**{**vars(layout), "names": tuple(names)})
     return CloudFile(
-        points=np.stack([table[plain.index(n)].astype(np.float64) for n in _POINT], axis=1),
-        normals=np.stack([table[plain.index(n)] for n in _NORMAL], axis=1) if has_normals else None,
-        attributes={name: table[k] for k, name in enumerate(names) if plain[k] not in used},
-        suffix=path.suffix.lower(),
-        source=_Layout(delimiter, tuple(head), tuple(names), header, counted),
+        points=np.stack([table[at[n]].astype(np.float64) for n in POINT], axis=1),
+        normals=np.stack([table[at[n]] for n in NORMAL], axis=1) if has_normals else None,
+        attributes={name: table[k] for k, name in enumerate(names) if k not in used},
+        suffix=suffix,
+        source=layout,
     )
 
 
-def _split(line: str, delimiter: str | None) -> list[str]:
-    return [word.strip() for word in line.strip().split(delimiter)]
-
-
-def _plain(name: str) -> str:
-    low = name.strip().strip('"').lower()
-    return _ALIASES.get(low, low)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _parse(path: Path, lines: list[str], start: int, delimiter: str | None, width: int) -> list[Array]:
+def _parse(path: Path, sheet: Sheet) -> list[Array]:
     """Parse the data lines into one array a column: integers, floats, or text."""
-    if width < 3:
-        raise malformed(
-            path, "text", f"line {start + 1} has {width} columns ({lines[start][:60]!r}), expected 3 or more"
-        )
-    data = lines[start:]
-    try:
-        table = np.loadtxt(data, dtype=np.float64, delimiter=delimiter, ndmin=2, comments=None)
-    except ValueError:
-        rows = [(k, line) for k, line in enumerate(data, start + 1) if line.strip()]
-        words = []
-        for k, line in rows:
-            row = _split(line, delimiter)
-            if len(row) != width:
-                raise malformed(
-                    path, "text", f"line {k} has {len(row)} columns, line {start + 1} has {width}"
-                ) from None
-            words.append(row)
-        return [_column(path, [row[c] for row in words], [k for k, _ in rows]) for c in range(width)]
-    first = _split(lines[start], delimiter)
-    return [_narrow(table[:, c], first[c], data, delimiter, c) for c in range(width)]
+    layout, width, data = sheet.layout, sheet.width, sheet.lines
+    if not layout.comma and '"' not in data[0]:
+        try:
+            table = np.loadtxt(data, dtype=np.float64, delimiter=layout.delimiter, ndmin=2, comments=None)
+            first = split(data[0], layout)
+            return [_narrow(table[:, c], first[c], data, layout.delimiter, c) for c in range(width)]
+        except ValueError:
+            pass
+    words = []
+    for k, line in zip(sheet.numbers, data, strict=True):
+        row = split(line, layout)
+        if len(row) == width + 1 and not row[-1]:
+            row.pop()
+        if len(row) != width:
+            found = f"line {k} has {len(row)} columns, line {sheet.numbers[0]} has {width}"
+            raise malformed(path, "text", found)
+        words.append(row)
+    return [_column(path, list(column), sheet.numbers) for column in zip(*words, strict=True)]
 
 
-def _column(path: Path, words: list[str], numbers: list[int]) -> Array:
-    """Turn one column into numbers, or keep it as text where none of it is one."""
+def _column(path: Path, words: list[str], numbers: list[int] | range) -> Array:
+    """Turn one column into numbers, or keep it as text where its first word is none; nothing is NaN."""
+    filled = [word for word in words if word]
     try:
-        return np.array(words, dtype=np.float64)
+        values = np.array([word or "nan" for word in words], dtype=np.float64)
     except ValueError:
-        if not _is_number(words[0]):
+        if filled and not is_number(filled[0]):
             return np.array(words)
-        k = next(k for k, word in enumerate(words) if not _is_number(word))
-        raise malformed(path, "text", f"line {numbers[k]}: {words[k][:40]!r} is not a number") from None
+        try:
+            # Fortran writes 1.0D+05.
+            return np.array([word.upper().replace("D", "E") or "nan" for word in words], dtype=np.float64)
+        except ValueError:
+            k = next(k for k, word in enumerate(words) if word and not is_number(word))
+            raise malformed(path, "text", f"line {numbers[k]}: {words[k][:40]!r} is not a number") from None
+    if not filled:
+        return np.array(words)
+    if len(filled) == len(words) and all(word.lstrip("+-").isdigit() for word in words):
+        try:
+            return np.array(words, dtype=np.int64)
+        except (ValueError, OverflowError):
+            return values
+    return values
 
 
 def _narrow(values: Array, first: str, data: list[str], delimiter: str | None, column: int) -> Array:
     """Turn whole numbers back into integers, so that a label 3 is not written as 3.0."""
-    if (
-        not first.lstrip("+-").isdigit()
-        or not np.all(np.isfinite(values))
-        or np.any(values != np.rint(values))
-    ):
+    if not first.lstrip("+-").isdigit() or not np.all(np.isfinite(values)) or np.any(values != np.rint(values)):
         return values
     if np.abs(values).max() < 2.0**53:
         return values.astype(np.int64)
@@ -152,41 +93,25 @@ def _narrow(values: Array, first: str, data: list[str], delimiter: str | None, c
         return values
 
 
-def _guess_names(table: list[Array]) -> list[str]:
-    """Name unnamed columns: x, y, z, then normals if the next three have unit length, then numbers."""
-    names = [*_POINT]
-    if len(table) >= 6 and all(column.dtype.kind in "fiu" for column in table[3:6]):
-        length = np.sqrt(sum(column.astype(np.float64) ** 2 for column in table[3:6]))
-        # Colours of 0 to 1 have this length only by chance; zero stands for "no normal".
-        if np.all((np.abs(length - 1.0) < 1e-2) | (length == 0)) and np.any(length):
-            names += _NORMAL
-    return names + [f"column_{k + 1}" for k in range(len(names), len(table))]
-
-
-def write(
-    path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None
-) -> None:
+def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[str, Array], keep: Array | None) -> None:
     """Write a text file of points; see `face_plugin.io.write_cloud`."""
     points, normals, attributes = columns(cloud, normals, extra, keep)
-    comma = path.suffix.lower() == ".csv"
     layout = cloud.source
-    if not isinstance(layout, _Layout):
-        layout = _Layout(
-            "," if comma else None,
-            (),
-            (*_POINT, *attributes),
-            "" if comma else None,
-            path.suffix.lower() == ".pts",
-        )
+    # Places of columns mean something in these; other text may look as the file that was read.
+    fixed = {".pts", ".xyzrgb"} & {path.suffix.lower(), cloud.suffix}
+    if not isinstance(layout, Layout) or (fixed and path.suffix.lower() != cloud.suffix):
+        layout, attributes = _fresh(path.suffix.lower(), attributes)
+    found = meanings(layout.names)
+    meaning = {name: key for key, name in found.items()}
+    has_normals = all(n in found for n in NORMAL)
     values: dict[str, Array] = {}
     for name in layout.names:
-        plain = _plain(name)
-        if plain in _POINT:
-            values[name] = points[:, _POINT.index(plain)]
-            if plain == "z" and normals is not None and not {*_NORMAL} <= {_plain(n) for n in layout.names}:
-                values.update({n: normals[:, k] for k, n in enumerate(_NORMAL)})
-        elif plain in _NORMAL and normals is not None:
-            values[name] = normals[:, _NORMAL.index(plain)]
+        if meaning.get(name) in POINT:
+            values[name] = points[:, POINT.index(meaning[name])]
+            if meaning[name] == "z" and normals is not None and not has_normals:
+                values.update({n: normals[:, k] for k, n in enumerate(NORMAL)})
+        elif meaning.get(name) in NORMAL and has_normals and normals is not None:
+            values[name] = normals[:, NORMAL.index(meaning[name])]
         else:
             values[name] = attributes[name]
     values.update({name: column for name, column in attributes.items() if name in extra})
@@ -196,5 +121,32 @@ def write(
         if layout.counted:
             stream.write(f"{len(points)}\n")
         if layout.header is not None:
-            stream.write(layout.header + separator.join(values) + "\n")
-        stream.write(interleave([format_column(column) for column in values.values()], separator))
+            names = [f'"{name}"' for name in values] if layout.quoted else values
+            stream.write(layout.header + separator.join(names) + "\n")
+        stream.write(interleave([_cells(column, layout) for column in values.values()], separator))
+
+
+def _fresh(suffix: str, attributes: dict[str, Array]) -> tuple[Layout, dict[str, Array]]:
+    """Layout of a file that is made anew: CSV has names, PTS a count and intensity before the colours."""
+    comma = suffix == ".csv"
+    names = [*POINT, *attributes]
+    if suffix in (".pts", ".xyzrgb"):
+        attributes = with_colours(attributes)
+        first = ["intensity"] if suffix == ".pts" else []
+        if all(c in attributes for c in COLOUR):
+            first += COLOUR
+            if suffix == ".xyzrgb":
+                attributes.update({c: np.round(attributes[c] / 255.0, 5) for c in COLOUR})
+        names = [*POINT, *(n for n in first if n in attributes), *(n for n in attributes if n not in first)]
+    layout = Layout("," if comma else None, (), tuple(names), "" if comma else None, suffix == ".pts")
+    return layout, attributes
+
+
+def _cells(values: Array, layout: Layout) -> list[str]:
+    cells = format_column(values)
+    if layout.comma and values.dtype.kind == "f":
+        sign = '"' if layout.delimiter == "," else ""
+        return [sign + cell.replace(".", ",") + sign for cell in cells]
+    if values.dtype.kind == "U" and layout.delimiter:
+        return [f'"{cell}"' if layout.delimiter in cell or '"' in cell else cell for cell in cells]
+    return cells

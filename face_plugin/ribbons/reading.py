@@ -13,7 +13,6 @@ from face_plugin.io import CloudFile, check_output, read_cloud, write_cloud, wri
 from face_plugin.ribbons.objstrokes import polylines_to_strokes, vertex_indices
 from face_plugin.ribbons.sketch import Polygons, Sketch, assemble
 from face_plugin.ribbons.strokes import ribbons
-from face_plugin.ribbons.truncated import read_ply
 
 __all__ = ["SKETCH_SUFFIXES", "read_sketch", "write_normals"]
 
@@ -65,7 +64,10 @@ def read_sketch(path: str | os.PathLike[str], *, width: float | None = None) -> 
         raise ValueError(f"{path}: extension {path.suffix!r}; allowed are {', '.join(SKETCH_SUFFIXES)}")
     if width is not None and not (np.isfinite(width) and width > 0):
         raise ValueError(f"width: found {width}, allowed is a positive number")
-    cloud, problems = read_ply(path) if path.suffix.lower() == ".ply" else (read_cloud(path), [])
+    # Faces that name absent vertices are counted and left out here, and a file that breaks off is drawn as far
+    # as it goes.
+    cloud = read_cloud(path, strict=False)
+    problems = list(cloud.problems)
     try:
         if path.suffix.lower() == ".ply":
             polygons, ids = _ply_polygons(cloud)

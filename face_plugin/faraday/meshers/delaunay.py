@@ -47,7 +47,6 @@ GUARD = 1e3
 BALL_TOLERANCE = 1e-3
 
 ADVICE = "try a larger Params.cage_spacing, which removes points that nearly coincide, or another Params.seed"
-GMSH_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1 libfontconfig1"
 _gmsh_lock = threading.Lock()
 
 
@@ -166,7 +165,7 @@ def _guards(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def gmsh_loads() -> bool:
-    """Whether gmsh can be loaded; it is installed with this package, but needs libraries of the system.
+    """Whether gmsh (extra ``gmsh``) is installed and can be loaded; it needs libraries of the system.
 
     Examples
     --------
@@ -181,12 +180,7 @@ def _gmsh() -> ModuleType | None:
     try:
         import gmsh
     except (ImportError, OSError) as error:
-        log.warning(
-            "gmsh cannot be loaded (%s): SciPy's Delaunay is used, about ten times slower. "
-            "On Debian or Ubuntu: apt-get install %s",
-            error,
-            GMSH_LIBRARIES,
-        )
+        log.info("gmsh cannot be loaded (%s): SciPy's Delaunay is used", error)
         return None
     return gmsh  # type: ignore[no-any-return]
 

@@ -1,0 +1,283 @@
+"""Read the rows of a PLY file. What the header claims is held against what the file has before it is believed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from face_plugin.io.cloudfile import Array
+from face_plugin.io.plydata import PlyData, PlyElement, parse_header
+
+__all__ = ["read_data"]
+
+
+class _RowError(Exception):
+    """A row that cannot be read; the rows before it are kept in `rows`."""
+
+    def __init__(self, reason: str, rows: Array) -> None:
+        super().__init__(reason)
+        self.rows = rows
+
+
+def read_data(path: Path, *, mapped: bool = False) -> PlyData:
+    """Read a PLY file: ascii or binary of either byte order.
+
+    What follows sound vertices may be broken: its rows are read as far as they go, and `PlyData.problems` says
+    what is missing.
+
+    Parameters
+    ----------
+    path : Path
+    mapped : bool
+        Leave binary rows on the disk, and read them where they are used.
+
+    Raises
+    ------
+    ValueError
+        The header or the vertices are malformed, or the file ends before they do.
+    OSError
+        The file cannot be opened.
+    """
+    if path.stat().st_size == 0:
+        raise ValueError("the file is empty: early end-of-file")
+    content = np.memmap(path, np.uint8, mode="r") if mapped else np.fromfile(path, np.uint8)
+    data, counts, start = parse_header(bytes(content[: _header_size(content)]))
+    rows = _TextRows(content, start) if data.text else _BinaryRows(content, start, data.byte_order)
+    for element, count in zip(data.elements, counts, strict=True):
+        if data.problems:
+            element.data = np.empty(0, dtype=_row_type(element, "=", [0] * len(element.properties)))
+            if count:
+                data.problems.append(f"the {count} rows of {element.name!r} behind that are left out")
+            continue
+        try:
+            element.data = rows.read(element, count)
+        except _RowError as error:
+            element.data = error.rows
+            found = len(error.rows)
+            if element.name == "vertex" or "vertex" not in [
+                e.name for e in data.elements[: data.elements.index(element)]
+            ]:
+                raise ValueError(f"{error}: element {element.name!r} has {found} of {count} rows") from None
+            if "malformed" in str(error):
+                data.problems.append(f"{error} in element {element.name!r}: only the rows before it are kept")
+            else:
+                data.problems.append(f"the header promises {count} rows of {element.name!r}, the file has {found}")
+    return data
+
+
+def _header_size(content: Array) -> int:
+    """Bytes to look for the header in: up to its last word and the line's end, in growing steps."""
+    size = 1 << 14
+    while size < len(content) and b"end_header" not in bytes(content[:size]):
+        size *= 4
+    return min(2 * size, len(content))
+
+
+def _row_type(element: PlyElement, order: str, lengths: list[int]) -> np.dtype[Any]:
+    """Type of a row whose lists are so long, without their counts."""
+    fields: list[Any] = []
+    for p, length in zip(element.properties, lengths, strict=True):
+        kind = order + p.kind
+        fields.append((p.name, kind) if p.length is None else (p.name, kind, (length,)))
+    return np.dtype(fields)
+
+
+class _BinaryRows:
+    """Rows of binary files, element by element."""
+
+    def __init__(self, content: Array, start: int, order: str) -> None:
+        self.content, self.start, self.order = content, start, order
+
+    def read(self, element: PlyElement, count: int) -> Array:
+        if all(p.length is None for p in element.properties):
+            kind = _row_type(element, self.order, [0] * len(element.properties))
+            if not kind.itemsize:
+                return np.empty(count, dtype=kind)
+            rows = self._view(kind, count)
+            self.start += len(rows) * kind.itemsize
+            if len(rows) < count:
+                raise _RowError("early end-of-file", rows)
+            return rows
+        return self._lists(element, count)
+
+    def _view(self, kind: np.dtype[Any], count: int) -> Array:
+        """Up to `count` rows of that type from here, as many as the file has."""
+        fit = min(count, (len(self.content) - self.start) // kind.itemsize)
+        rows: Array = self.content[self.start : self.start + fit * kind.itemsize].view(kind)
+        return rows
+
+    def _lists(self, element: PlyElement, count: int) -> Array:
+        """Read runs of rows whose lists have the same lengths."""
+        runs: list[Array] = []
+        done, block = 0, count
+        problem = ""
+        while done < count and not problem:
+            lengths = self._lengths(element)
+            if lengths is None:
+                problem = "early end-of-file"
+                break
+            kind = self._counted_type(element, lengths)
+            rows = self._view(kind, min(block, count - done))
+            alike = np.ones(len(rows), dtype=bool)
+            for p, length in zip(element.properties, lengths, strict=True):
+                if p.length is not None:
+                    alike &= rows[f"{p.name} length"] == length
+            fit = len(rows) if alike.all() else int(np.argmin(alike))
+            # Where runs are short, looking far ahead each time would take the square of the time.
+            block = 2 * fit + 16
+            if not fit:
+                problem = "early end-of-file"
+            else:
+                runs.append(rows[:fit][[p.name for p in element.properties]])
+            done += fit
+            self.start += fit * kind.itemsize
+        table = _joined(element, runs, self.order)
+        if problem:
+            raise _RowError(problem, table)
+        return table
+
+    def _lengths(self, element: PlyElement) -> list[int] | None:
+        """Lengths of the lists of the row that begins here; None where the file ends first."""
+        at, lengths = self.start, []
+        for p in element.properties:
+            length = 0
+            if p.length is not None:
+                kind = np.dtype(self.order + p.length)
+                raw = self.content[at : at + kind.itemsize].tobytes()
+                if len(raw) < kind.itemsize:
+                    return None
+                length = int(np.frombuffer(raw, kind)[0])
+                if not 0 <= length <= len(self.content):
+                    return None
+                at += kind.itemsize
+            lengths.append(length)
+            at += int(p.kind[1:]) * (1 if p.length is None else length)
+        return lengths if at <= len(self.content) else None
+
+    def _counted_type(self, element: PlyElement, lengths: list[int]) -> np.dtype[Any]:
+        fields: list[Any] = []
+        for p, length in zip(element.properties, lengths, strict=True):
+            if p.length is None:
+                fields.append((p.name, self.order + p.kind))
+            else:
+                fields.append((f"{p.name} length", self.order + p.length))
+                fields.append((p.name, self.order + p.kind, (length,)))
+        return np.dtype(fields)
+
+
+def _joined(element: PlyElement, runs: list[Array], order: str) -> Array:
+    """One table of runs: 2-d fields where lists have one length throughout, else fields of arrays."""
+    if not runs:
+        return np.empty(0, dtype=_row_type(element, order, [0] * len(element.properties)))
+    if len(runs) == 1:
+        return runs[0]
+    fields: list[Any] = []
+    for p in element.properties:
+        kinds = {run.dtype[p.name] for run in runs}
+        fields.append((p.name, kinds.pop() if len(kinds) == 1 else np.dtype(object)))
+    table = np.empty(sum(map(len, runs)), dtype=fields)
+    for p in element.properties:
+        at = 0
+        for run in runs:
+            part = slice(at, at + len(run))
+            if table.dtype[p.name].hasobject:
+                column = table[p.name]
+                for k, row in enumerate(run[p.name], at):
+                    column[k] = row
+            else:
+                table[p.name][part] = run[p.name]
+            at += len(run)
+    return table
+
+
+class _TextRows:
+    """Rows of ascii files: one a line, blank lines left out."""
+
+    def __init__(self, content: Array, start: int) -> None:
+        self.lines = [line for line in bytes(content[start:]).splitlines() if line.strip()]
+        self.next = 0
+
+    def read(self, element: PlyElement, count: int) -> Array:
+        if not element.properties:
+            return np.empty(count, dtype=[])
+        lines = self.lines[self.next : self.next + count]
+        self.next += len(lines)
+        try:
+            table = self._table(element, lines)
+        except ValueError:
+            table = self._by_words(element, lines, count)
+        if len(table) < count:
+            raise _RowError("early end-of-file", table)
+        return table
+
+    def _table(self, element: PlyElement, lines: list[bytes]) -> Array:
+        """Parse lines of one width in one go."""
+        lengths, at = [], 0
+        first = lines[0].split() if lines else []
+        for p in element.properties:
+            lengths.append(0 if p.length is None or not lines else int(first[at]) if at < len(first) else -1)
+            at += 1 if p.length is None else 1 + lengths[-1]
+            if lengths[-1] < 0 or (at > max(len(first), 1) and lines):
+                raise ValueError
+        table = np.empty(len(lines), dtype=_row_type(element, "=", lengths))
+        if not lines:
+            return table
+        if at != len(first):
+            raise ValueError
+        numbers = np.loadtxt(lines, dtype=np.float64, ndmin=2, comments=None)
+        if numbers.shape != (len(lines), at):
+            raise ValueError
+        column = 0
+        for p, length in zip(element.properties, lengths, strict=True):
+            if p.length is None:
+                table[p.name] = _typed(numbers[:, column], p.kind)
+                column += 1
+            else:
+                if (numbers[:, column] != length).any():
+                    raise ValueError
+                table[p.name] = _typed(numbers[:, column + 1 : column + 1 + length], p.kind)
+                column += 1 + length
+        return table
+
+    def _by_words(self, element: PlyElement, lines: list[bytes], count: int) -> Array:
+        """Parse line by line, to the first that does not fit."""
+        table = np.empty(
+            len(lines), dtype=[(p.name, p.kind if p.length is None else object) for p in element.properties]
+        )
+        for k, line in enumerate(lines):
+            words = line.split()
+            at = 0
+            try:
+                for p in element.properties:
+                    size = 1
+                    if p.length is not None:
+                        size = int(words[at])
+                        at += 1
+                    if size < 0 or len(words) < at + size:
+                        raise IndexError
+                    values = _typed(np.array([float(word) for word in words[at : at + size]]), p.kind)
+                    table[p.name][k] = values[0] if p.length is None else values
+                    at += size
+                if at < len(words):
+                    raise ValueError
+            except (ValueError, IndexError) as error:
+                last = k == len(lines) - 1 and self.next >= len(self.lines) and isinstance(error, IndexError)
+                shown = line[:60].decode("latin-1")
+                reason = "early end-of-line" if last else f"row {k + 1} is malformed ({shown!r})"
+                raise _RowError(reason, table[:k]) from None
+        return table
+
+
+def _typed(values: Array, kind: str) -> Array:
+    """Cast numbers that were read as float64; ValueError where the type cannot hold them."""
+    target = np.dtype(kind)
+    if target.kind == "f":
+        return values.astype(target)
+    limits = np.iinfo(target)
+    with np.errstate(invalid="ignore"):
+        whole = (values >= limits.min) & (values <= limits.max)
+    if not whole.all():
+        raise ValueError(f"{values[~whole].flat[0]} does not fit into {target}")
+    return values.astype(target)

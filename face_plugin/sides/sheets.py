@@ -143,7 +143,8 @@ def find_sheets(points: NDArray[np.float64], distance: NDArray[np.float64], neig
 
     Examples
     --------
-    >>>     >>> plate = slab(2000, thickness=0.2).points
+    >>> from face_plugin.shapes import slab
+    >>> plate = slab(2000, thickness=0.2).points
     >>> found = find_sheets(plate, *cKDTree(plate).query(plate, k=97))
     >>> bool(0.18 < np.median(found.near) < 0.3)
     True

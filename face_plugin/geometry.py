@@ -12,10 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-__all__ = ["in_threads", "local_spacing", "log_ramp", "neighbourhoods", "plane_fit", "ramp", "thin", "unit"]
-
-# Neighbours that are looked at around a point.
-NEIGHBOURS = 96
+__all__ = ["in_threads", "local_spacing", "log_ramp", "plane_fit", "ramp", "thin", "unit"]
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -42,12 +39,6 @@ def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[n
     k = min(neighbours, len(points) - 1)
     distance, _ = cKDTree(points).query(points, k=k + 1, workers=-1)
     return np.asarray(distance[:, 1:].mean(axis=1))
-
-
-def neighbourhoods(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Distances (n, k) to the points among which the next sheet is looked for, and their rows; a point itself first."""
-    found = cKDTree(points).query(points, k=min(NEIGHBOURS + 1, len(points)), workers=-1)
-    return np.asarray(found[0]), np.asarray(found[1])
 
 
 def plane_fit(

@@ -11,23 +11,19 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin import cloud
-from face_plugin.faraday import domain, field, gradient
-from face_plugin.faraday.balls import build_balls
+from face_plugin.faraday import field
+from face_plugin.faraday.gradient import FieldAtPoints, field_at_points
 from face_plugin.faraday.inside import shielded
 from face_plugin.faraday.locate import Locator
-from face_plugin.faraday.meshers.select import build_mesh
-from face_plugin.faraday.poisson import Poisson
-from face_plugin.geometry import local_spacing, thin
-from face_plugin.params import ALPHAS, Params
-from face_plugin.refine import refine
+from face_plugin.method import orient, solve_field
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.params import Params
 from face_plugin.result import Progress, Result
 from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence
-from face_plugin.sides.sheets import cage_separation
 
 __all__ = ["FaCE"]
 
@@ -70,71 +66,33 @@ class FaCE(Sculptable):
         self._solve(points)
 
     def _solve(self, points: ArrayLike) -> None:
-        params = self.params
-        # 1. Check the points and put them into a canonical frame.
         with self._stage("cloud"):
             self.cloud = cloud.prepare(points)
             self.frame = self.cloud.frame
-        # 2. Conducting balls at the points: near-duplicates left out, and points on sheets with nothing else near.
-        with self._stage("cage"):
-            spacing = None if params.cage_spacing is None else params.cage_spacing / self.frame.scale
-            separation, self._sheets = cage_separation(self.cloud.points, spacing, coarsen=params.angles == "refined")
-            rows = thin(self.cloud.points, separation, params.seed)
-            self.balls = build_balls(
-                self.cloud.points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed
-            )
-        # 3. A padded box.
-        with self._stage("domain"):
-            box = domain.padded_box(self.balls, params.padding, params.least_side)
-            local = local_spacing(self.balls.centres)
-        # 4. Tetrahedra between the box and the balls, graded from these to it.
-        with self._stage("mesh"):
-            self.mesh = build_mesh(self.balls, local, box, params)
-        # 5. Potentials in three basis fields; every other direction is their combination.
-        with self._stage("poisson"):
-            self.poisson = Poisson(self.mesh, params.solver)
-            self._potential = self.poisson.solve(self.mesh.vertices[self.mesh.boundary])
-        # 6. The greatest strength that an external field of any direction causes.
-        with self._stage("field"):
-            self.vertex_strength = self._strength_of(self._potential)
+        self._around = Neighbourhood(self.cloud.points)
+        solved = solve_field(self._around, self.params, self.frame.scale, stage=self._stage)
+        self.balls, self.mesh, self.poisson = solved.cage.balls, solved.cage.mesh, solved.cage.poisson
+        self._potential, self.vertex_strength, self._sheets = solved.cage.potential, solved.strength, solved.sheets
 
     def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:
         return field.strength(self.mesh, potential, self.params.directions)
 
     @cached_property
-    def _point_strength(self) -> NDArray[np.float64]:
-        """E_max at the balls nearest to the distinct points (m,)."""
-        ball = cKDTree(self.balls.centres).query(self.cloud.points, workers=-1)[1]
-        return np.asarray(gradient.ball_means(self.mesh, self.vertex_strength)[ball])
-
-    @cached_property
-    def _field_normals(self) -> NDArray[np.float64]:
-        """Gradient of the strength at the distinct points (m, 3), in the canonical frame."""
-        at_balls = gradient.field_normals(self.mesh, self.vertex_strength)
-        return gradient.carry(self.balls.centres, at_balls, self.cloud.points)
+    def _seen(self) -> FieldAtPoints:
+        """What the field says of the distinct points."""
+        return field_at_points(self.mesh, self.vertex_strength, self.balls, self.cloud.points)
 
     @cached_property
     def _normals(self) -> NDArray[np.float64]:
         """Normals of the distinct points (m, 3), in the canonical frame."""
         with self._stage("normals"):
-            if self.cloud.flat:
-                # The field is the same on both sides of a sheet: its mean gradient lies in the sheet.
-                return np.tile(self.cloud.plane_normal(), (len(self.cloud.points), 1))
-            # 7. The strength grows outward, so its gradient at a ball points outward.
-            if self.params.angles == "field":
-                return self._field_normals
-            # 8. Stray sides turned round, and angles, from the points themselves.
-            return refine(self.cloud.points, self._votes, self._point_strength, sheets=self._sheets)
-
-    @cached_property
-    def _votes(self) -> NDArray[np.float64]:
-        """Field normals (m, 3), zero where there is no field: its gradient there is rounding, and must not spread."""
-        return np.where((self._point_strength > gradient.ROUNDING)[:, None], self._field_normals, 0.0)
+            plane = self.cloud.plane_normal() if self.cloud.flat else None
+            return orient(self._around, self._seen, self.params, plane=plane, sheets=self._sheets)
 
     @cached_property
     def _enclosed(self) -> NDArray[np.bool_]:
         """Which distinct points (m,) the others enclose."""
-        return enclosure.enclosed(self.cloud.points, self._normals, self._point_strength)
+        return enclosure.enclosed(self._around, self._normals, self._seen.strength)
 
     def normals(self) -> NDArray[np.floating]:
         """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
@@ -178,20 +136,18 @@ class FaCE(Sculptable):
         -------
         (n,) bool
         """
-        level, enclosed = self._threshold(self.params.alpha if alpha is None else alpha)
+        alpha = Params(alpha=self.params.alpha if alpha is None else alpha).alpha  # type: ignore[arg-type]
+        level = self._threshold(alpha)
         with self._stage("interior"):
-            inside = np.ones(len(self.cloud.points), dtype=np.bool_) if enclosed is None else enclosed.copy()
+            # What alpha is derived from decides as well.
+            inside = self._enclosed.copy() if alpha == "auto" else np.ones(len(self.cloud.points), dtype=np.bool_)
             if inside.any():
                 candidates = self.cloud.points[inside]
                 inside[inside] = shielded(self.mesh, self.vertex_strength, candidates, level, self.params.inside)
             return inside[self.cloud.rows]
 
-    def _threshold(self, alpha: float | str) -> tuple[float, NDArray[np.bool_] | None]:
-        """Alpha as a number and, where it is automatic, which points (m,) are enclosed, as those inside must be."""
-        alpha = Params(alpha=alpha).alpha  # type: ignore[arg-type]
-        if alpha == "auto":
-            return enclosure.automatic_alpha(self._point_strength[self._enclosed]), self._enclosed
-        return (ALPHAS[alpha] if isinstance(alpha, str) else alpha), None
+    def _threshold(self, alpha: float | str) -> float:
+        return enclosure.threshold(alpha, lambda: self._seen.strength[self._enclosed])
 
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
@@ -199,11 +155,11 @@ class FaCE(Sculptable):
         oriented = self.normals()
         params = self.params
         if filter_interior:
-            params = dataclasses.replace(params, alpha=self._threshold(params.alpha)[0])
+            params = dataclasses.replace(params, alpha=self._threshold(params.alpha))
         return Result(
             normals=oriented,
-            strength=self._point_strength[rows].astype(dtype),
-            confidence=confidence(self.cloud.points, self._votes, self._normals)[rows].astype(dtype),
+            strength=self._seen.strength[rows].astype(dtype),
+            confidence=confidence(self._around, self._seen.votes, self._normals)[rows].astype(dtype),
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=params,

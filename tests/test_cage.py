@@ -5,6 +5,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from face_plugin import shapes
 from face_plugin.faraday.balls import SOLIDS, build_balls
 from face_plugin.geometry import local_spacing, thin
+from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.sheets import cage_separation
 
 RNG = np.random.default_rng(0)
@@ -60,27 +61,28 @@ def test_local_spacing_is_the_mean_distance_to_the_nearest():
 
 
 def test_separation():
-    np.testing.assert_array_equal(cage_separation(POINTS, 0.25)[0], np.full(400, 0.25))
+    np.testing.assert_array_equal(cage_separation(Neighbourhood(POINTS), 0.25)[0], np.full(400, 0.25))
     eighth = np.sort(np.linalg.norm(POINTS[:, None] - POINTS, axis=2), axis=1)[:, 8]
     # Points in a volume are no sheet: only near-duplicates go.
-    np.testing.assert_allclose(cage_separation(POINTS, None)[0], 0.35 * eighth)
+    np.testing.assert_allclose(cage_separation(Neighbourhood(POINTS), None)[0], 0.35 * eighth)
     # Too few to tell what is near: each carries a ball.
-    np.testing.assert_array_equal(cage_separation(POINTS[:8], None)[0], 0.0)
-    assert (cage_separation(POINTS[:9], None)[0] > 0).all()
+    np.testing.assert_array_equal(cage_separation(Neighbourhood(POINTS[:8]), None)[0], 0.0)
+    assert (cage_separation(Neighbourhood(POINTS[:9]), None)[0] > 0).all()
 
 
 def test_the_cage_is_coarse_where_nothing_else_is_near_and_fine_where_a_wall_is_thin():
     sphere = shapes.sphere(20000, 0)
-    assert len(thin(sphere.points, cage_separation(sphere.points / 2, None)[0] * 2, 0)) < 0.35 * 20000
+    assert len(thin(sphere.points, cage_separation(Neighbourhood(sphere.points / 2), None)[0] * 2, 0)) < 0.35 * 20000
     # The field's own angles need every ball.
-    assert len(thin(sphere.points, cage_separation(sphere.points / 2, None, coarsen=False)[0] * 2, 0)) == 20000
+    fine = cage_separation(Neighbourhood(sphere.points / 2), None, coarsen=False)[0] * 2
+    assert len(thin(sphere.points, fine, 0)) == 20000
     slab = shapes.slab(5000, 0, thickness=0.02)
-    assert len(thin(slab.points, cage_separation(slab.points, None)[0], 0)) > 0.9 * 5000
+    assert len(thin(slab.points, cage_separation(Neighbourhood(slab.points), None)[0], 0)) > 0.9 * 5000
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_thinned_points_keep_their_distance_and_leave_no_gap(seed):
-    separation = cage_separation(POINTS, None)[0]
+    separation = cage_separation(Neighbourhood(POINTS), None)[0]
     taken = thin(POINTS, separation, seed)
     assert (np.diff(taken) > 0).all()
     tree = cKDTree(POINTS[taken])
@@ -94,9 +96,9 @@ def test_thinned_points_keep_their_distance_and_leave_no_gap(seed):
 
 def test_thinning_removes_twins_and_keeps_an_even_sampling():
     lattice = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    assert len(thin(lattice, cage_separation(lattice, None)[0], 0)) == len(lattice)
+    assert len(thin(lattice, cage_separation(Neighbourhood(lattice), None)[0], 0)) == len(lattice)
     twins = np.concatenate([lattice, lattice + 1e-3])
-    assert len(thin(twins, cage_separation(twins, None)[0], 0)) == len(lattice)
+    assert len(thin(twins, cage_separation(Neighbourhood(twins), None)[0], 0)) == len(lattice)
 
 
 @pytest.mark.parametrize("separation", [0.0, 1e-12])

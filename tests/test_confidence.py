@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from face_plugin import FaCE, shapes
+from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.confidence import confidence
 
 
@@ -28,5 +29,6 @@ def test_the_least_confident_points_are_wrong_most_often():
 
 def test_confidence_of_some_points_is_that_among_all():
     ball, rows = shapes.sphere(500, 0), np.array([3, 100, 77])
-    every = confidence(ball.points, ball.normals, ball.normals)
-    assert np.array_equal(confidence(ball.points, ball.normals, ball.normals, rows), every[rows])
+    around = Neighbourhood(ball.points)
+    every = confidence(around, ball.normals, ball.normals)
+    assert np.array_equal(confidence(around, ball.normals, ball.normals, rows), every[rows])

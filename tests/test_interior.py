@@ -7,6 +7,7 @@ import pytest
 
 from face_plugin import FaCE, Params, shapes
 from face_plugin.geometry import local_spacing
+from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.enclosure import automatic_alpha, enclosed
 
 SOLIDS = {
@@ -80,7 +81,7 @@ def test_what_lies_inside_does_not_blur_what_is_enclosed():
     strength = np.where(nested.interior, 0.0, 1.0)
     # Whatever way the points inside face: the random sides that a sealed cage leaves them with.
     sides = np.where(nested.interior & (np.random.default_rng(0).random(len(strength)) < 0.5), -1.0, 1.0)
-    found = enclosed(nested.points, nested.normals * sides[:, None], strength)
+    found = enclosed(Neighbourhood(nested.points), nested.normals * sides[:, None], strength)
     assert (found == nested.interior).all()
 
 
@@ -94,7 +95,7 @@ def test_a_crease_is_not_enclosed():
     normal = np.array([-np.cos(slope), 0.0, np.sin(slope)])
     points = np.concatenate([right, left])
     normals = np.concatenate([np.tile(normal, (len(right), 1)), np.tile(normal * [-1, 1, 1], (len(left), 1))])
-    assert not enclosed(points, normals, np.ones(len(points))).any()
+    assert not enclosed(Neighbourhood(points), normals, np.ones(len(points))).any()
 
 
 def test_an_unknown_name_is_refused():

@@ -8,7 +8,8 @@ from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, Params, shapes
 from face_plugin.geometry import unit
-from face_plugin.refine import refine
+from face_plugin.method import refine
+from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.sheets import back_to_back, bulk, next_sheet
 
 
@@ -20,7 +21,7 @@ def rough(normals: np.ndarray, flipped: float, seed: int = 0) -> np.ndarray:
 
 
 def refined(shape: shapes.Shape, normals: np.ndarray, strength: float = 1.0) -> np.ndarray:
-    return refine(shape.points, normals, np.full(len(normals), strength))
+    return refine(Neighbourhood(shape.points), normals, np.full(len(normals), strength))
 
 
 def angles(normals: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -61,8 +62,7 @@ def test_a_plate_thinner_than_the_spacing_keeps_its_two_sides():
 
 def test_noise_is_not_a_plate():
     ball = shapes.with_noise(shapes.sphere(2000, 0), 0.015, 0)
-    distance, neighbour = cKDTree(ball.points).query(ball.points, k=25)
-    mask = back_to_back(ball.points, rough(ball.normals, 0.1), neighbour, distance[:, 1:7].mean(axis=1))
+    mask = back_to_back(Neighbourhood(ball.points), rough(ball.normals, 0.1))
     assert not mask.any()
 
 
@@ -77,7 +77,7 @@ def test_the_next_sheet_is_a_walls_thickness_away():
 
 def test_few_points_are_enough():
     points = shapes.sphere(12, 0).points
-    assert refine(points, unit(points), np.ones(12)).shape == (12, 3)
+    assert refine(Neighbourhood(points), unit(points), np.ones(12)).shape == (12, 3)
 
 
 def bar(n: int = 80, thickness: float = 0.8) -> tuple[np.ndarray, np.ndarray]:
@@ -89,10 +89,10 @@ def bar(n: int = 80, thickness: float = 0.8) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_bar_thinner_than_the_spacing_keeps_the_fields_sides():
     points, normals = bar()
-    kept = refine(points, normals, np.full(len(points), 3.0))
+    kept = refine(Neighbourhood(points), normals, np.full(len(points), 3.0))
     assert ((kept * normals).sum(axis=1) > 0).mean() > 0.95
     # Without a field that stands out, the same points could as well be noise about a curve: their sides drift.
-    drifted = refine(points, normals, np.full(len(points), 0.01))
+    drifted = refine(Neighbourhood(points), normals, np.full(len(points), 0.01))
     assert ((drifted * normals).sum(axis=1) > 0).mean() < 0.9
 
 
@@ -125,5 +125,5 @@ def test_a_stroke_far_from_the_next_one_is_turned_to_their_common_outside():
     points = normals + x[:, None] * [1.0, 0.0, 0.0]
     wrong = (np.arange(len(points)) // 320 == 2) & (x < 2.0)
     rough_normals = np.where(wrong[:, None], -normals, normals)
-    sides = (refine(points, rough_normals, np.ones(len(points))) * normals).sum(axis=1) > 0
+    sides = (refine(Neighbourhood(points), rough_normals, np.ones(len(points))) * normals).sum(axis=1) > 0
     assert sides.mean() > 0.99

@@ -18,12 +18,11 @@ from face_plugin.shapes import demo_shape, sphere
 from face_plugin.tiles import estimate_tiled, in_tiles
 from face_plugin.tiles.coarse import solve_coarse
 from face_plugin.tiles.engines import Processes
-from face_plugin.tiles.polish import polish_tile
 from face_plugin.tiles.prepare import fill_store
 from face_plugin.tiles.run import collect, solve_store
 from face_plugin.tiles.scene import write_far
-from face_plugin.tiles.solve import HALO, solve_tile
 from face_plugin.tiles.surroundings import surroundings
+from face_plugin.tiles.tile import HALO, orient_tile, solve_tile
 
 PARAMS = Params(tile_points=1000, engine="serial")
 
@@ -91,7 +90,7 @@ def test_interior_of_a_solid_larger_than_a_tile(tmp_path):
         solve_tile(str(tmp_path), tile)
     write_far(store)
     for tile in range(store.tiles):
-        polish_tile(str(tmp_path), tile)
+        orient_tile(str(tmp_path), tile)
     found = collect(store)
     inside = np.arange(source.count) >= 3000
     assert found["interior"][inside].all()

@@ -10,14 +10,15 @@ from face_plugin.faraday.domain import Box
 from face_plugin.faraday.gradient import ball_means
 from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.poisson import Poisson
-from face_plugin.faraday.solve import solve_level
+from face_plugin.faraday.solve import solve_cage
 from face_plugin.io.sources import ArraySource
+from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.shapes import demo_shape, sphere
 from face_plugin.sides.sheets import cage_separation
 from face_plugin.tiles.coarse import Coarse, Voxels, solve_coarse, voxel_size
 from face_plugin.tiles.prepare import fill_store
-from face_plugin.tiles.solve import HALO
 from face_plugin.tiles.surroundings import surroundings
+from face_plugin.tiles.tile import HALO
 
 RNG = np.random.default_rng(1)
 
@@ -65,13 +66,13 @@ def test_the_error_of_the_transfer_decays_with_the_halo(tmp_path):
     params = store.params
     coarse = solve_coarse(voxels, params)
     cloud = np.array(store.points())
-    one = solve_level(cloud, np.zeros(len(cloud)), params)
+    one = solve_cage(cloud, np.zeros(len(cloud)), params)
     exact = Coarse(one.mesh, one.potential, one.cage_value, Locator(one.mesh))
 
     def strength(part, around):
-        level = solve_level(
+        level = solve_cage(
             part.points,
-            cage_separation(part.points, None)[0],
+            cage_separation(Neighbourhood(part.points), None)[0],
             params,
             box=Box(part.lower - part.spacing, part.upper + part.spacing),
             given=around.at,

@@ -15,7 +15,7 @@ from face_plugin.shapes import sphere
 from face_plugin.tiles import estimate_tiled
 from face_plugin.tiles.engines import Processes, Serial
 from face_plugin.tiles.plan import make_engine
-from face_plugin.tiles.warm import warm_up
+from face_plugin.tiles.tile import warm_up
 
 
 def test_gmsh_leaves_broken_pipes_to_python():

@@ -2,20 +2,57 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.field import vertex_gradients
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.geometry import unit
 
-__all__ = ["ROUNDING", "ball_means", "carry", "field_normals"]
+__all__ = ["FieldAtPoints", "ball_means", "carry", "field_at_points", "field_normals"]
 
 CARRY_NEIGHBOURS = 3
-
+# E_max below which double precision leaves nothing of the direction of its gradient; unshielded space has 1.
 ROUNDING = 1e-9
-"""E_max below which double precision leaves nothing of the direction of its gradient (unshielded space has 1)."""
+
+
+@dataclass(frozen=True)
+class FieldAtPoints:
+    """What the field says of points."""
+
+    strength: NDArray[np.float64]
+    """(n,) E_max at the nearest ball."""
+    normals: NDArray[np.float64]
+    """(n, 3) unit gradients of E_max, which point outward."""
+
+    @property
+    def votes(self) -> NDArray[np.float64]:
+        """`normals` (n, 3), zero where there is no field: its gradient there is rounding, and must not spread."""
+        return np.where((self.strength > ROUNDING)[:, None], self.normals, 0.0)
+
+
+def field_at_points(
+    mesh: CageMesh, strength: NDArray[np.float64], balls: Balls, points: NDArray[np.float64]
+) -> FieldAtPoints:
+    """Field strength and its gradient at points, from the balls nearest to them.
+
+    Parameters
+    ----------
+    mesh : CageMesh
+    strength : (m,) float64
+        E_max at the vertices of the mesh.
+    balls : Balls
+        Of the mesh.
+    points : (n, 3) float64
+        In the frame of the mesh.
+    """
+    ball = cKDTree(balls.centres).query(points, workers=-1)[1]
+    normals = carry(balls.centres, field_normals(mesh, strength), points)
+    return FieldAtPoints(ball_means(mesh, strength)[ball], normals)
 
 
 def ball_means(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float64]:

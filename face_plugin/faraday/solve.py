@@ -1,60 +1,65 @@
-"""One cage in one box: what the whole cloud's coarse level and every tile solve alike."""
+"""One cage in one box: what a cloud in one piece, a large cloud's coarse cage and every tile solve alike."""
 
 from __future__ import annotations
 
 import dataclasses
 import logging
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import MeshingError
-from face_plugin.faraday import domain
 from face_plugin.faraday.balls import Balls, build_balls
+from face_plugin.faraday.domain import Box, padded_box
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.meshers.select import build_mesh
 from face_plugin.faraday.poisson import Poisson
 from face_plugin.geometry import local_spacing, thin
 from face_plugin.params import Params
 
-__all__ = ["Level", "solve_level"]
+__all__ = ["SolvedCage", "Stage", "solve_cage"]
 
 log = logging.getLogger(__name__)
 
-Clock = Callable[[str], None]
-"""Called with the name of a stage when it ends."""
+Stage = Callable[[str], AbstractContextManager[object]]
+"""What a stage of the given name runs in, such as a clock."""
 
 # Another seed turns and jitters everything anew: what made one mesh degenerate is then gone.
 ATTEMPTS = 3
-# A ball reaches at most this far of its way to the box: beyond, it would cut through it.
+# A ball reaches at most this fraction of its way to a given box: beyond, it would cut through it.
 REACH = 0.45
 
 
 @dataclass(frozen=True)
-class Level:
-    """A solved cage."""
+class SolvedCage:
+    """A cage, the mesh around it, and the potential in it."""
 
     balls: Balls
     mesh: CageMesh
+    poisson: Poisson
     potential: NDArray[np.float64]
-    """(m, 3) potential at the vertices in a unit field along each canonical axis."""
-    cage_value: NDArray[np.float64]
-    """(3,) potential of the cage in each."""
+    """(m, 3) at the vertices: column k is that of a unit field along canonical axis k."""
+
+    @property
+    def cage_value(self) -> NDArray[np.float64]:
+        """Potential (3,) of the cage in each."""
+        return np.asarray(self.potential[np.argmax(self.mesh.owner >= 0)])
 
 
-def solve_level(
+def solve_cage(
     points: NDArray[np.float64],
     separation: NDArray[np.float64],
     params: Params,
     *,
-    box: domain.Box | None = None,
+    box: Box | None = None,
     given: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     cage_value: NDArray[np.float64] | None = None,
-    clock: Clock = lambda stage: None,
-) -> Level:
-    """Build a cage on points and solve its three basis potentials.
+    stage: Stage = nullcontext,
+) -> SolvedCage:
+    """Build a cage on points and solve its three basis potentials (paper sections 3.1 and 3.2).
 
     Parameters
     ----------
@@ -68,11 +73,12 @@ def solve_level(
         Potential (q, 3) at positions (q, 3) on the box; by default that of unit fields along the axes.
     cage_value : (3,) float64, optional
         Potential of the cage; by default it floats at zero net charge.
-    clock : callable, optional
+    stage : callable, optional
+        Entered for "domain", "mesh" and "poisson".
 
     Returns
     -------
-    Level
+    SolvedCage
 
     Raises
     ------
@@ -81,41 +87,38 @@ def solve_level(
     """
     for attempt in range(ATTEMPTS):
         try:
-            balls, mesh = _mesh(points, separation, params, box, params.seed + attempt, clock)
+            balls, mesh = _mesh(points, separation, dataclasses.replace(params, seed=params.seed + attempt), box, stage)
             break
         except MeshingError as error:
             if attempt == ATTEMPTS - 1:
                 raise
             log.warning("%s; trying again with another seed", error)
-    poisson = Poisson(mesh, params.solver)
-    on_box = mesh.vertices[mesh.boundary]
-    potential = poisson.solve(on_box if given is None else given(on_box), cage_value)
-    clock("poisson")
-    return Level(balls, mesh, potential, potential[np.argmax(mesh.owner >= 0)])
+    # Three basis fields: every other direction is their combination.
+    with stage("poisson"):
+        poisson = Poisson(mesh, params.solver)
+        on_box = mesh.vertices[mesh.boundary]
+        potential = poisson.solve(on_box if given is None else given(on_box), cage_value)
+    return SolvedCage(balls, mesh, poisson, potential)
 
 
 def _mesh(
-    points: NDArray[np.float64],
-    separation: NDArray[np.float64],
-    params: Params,
-    box: domain.Box | None,
-    seed: int,
-    clock: Clock,
+    points: NDArray[np.float64], separation: NDArray[np.float64], params: Params, box: Box | None, stage: Stage
 ) -> tuple[Balls, CageMesh]:
-    rows = thin(points, separation, seed)
-    balls = build_balls(points, rows, radius=params.ball_radius, solid=params.solid, seed=seed)
-    if box is not None:
-        balls = _within(balls, box)
-    clock("cage")
-    if box is None:
-        box = domain.padded_box(balls, params.padding, params.least_side)
-    spacing = local_spacing(balls.centres)
-    mesh = build_mesh(balls, spacing, box, dataclasses.replace(params, seed=seed))
-    clock("mesh")
-    return balls, mesh
+    # The domain: a box without conducting balls, no two of which are nearer than their separation.
+    with stage("domain"):
+        rows = thin(points, separation, params.seed)
+        balls = build_balls(points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed)
+        if box is not None:
+            balls = _within(balls, box)
+        else:
+            box = padded_box(balls, params.padding, params.least_side)
+        spacing = local_spacing(balls.centres)
+    # Tetrahedra between the box and the balls, graded from these to it.
+    with stage("mesh"):
+        return balls, build_mesh(balls, spacing, box, params)
 
 
-def _within(balls: Balls, box: domain.Box) -> Balls:
+def _within(balls: Balls, box: Box) -> Balls:
     """Shrink the balls that would reach the box: an isolated point near it has a large one."""
     room = np.minimum(balls.centres - box.lower, box.upper - balls.centres).min(axis=1)
     radii = np.minimum(balls.radii, REACH * room)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from face_plugin.winding import DipoleTree
+from face_plugin.neighbourhood import Neighbourhood
 
 __all__ = ["confidence"]
 
 
 def confidence(
-    points: NDArray[np.float64],
+    around: Neighbourhood,
     field: NDArray[np.float64],
     normals: NDArray[np.float64],
     rows: NDArray[np.intp] | slice = slice(None),
@@ -29,7 +28,8 @@ def confidence(
 
     Parameters
     ----------
-    points : (n, 3) float64
+    around : Neighbourhood
+        Of the points.
     field : (n, 3) float64
         Unit gradients of E_max.
     normals : (n, 3) float64
@@ -41,14 +41,13 @@ def confidence(
     --------
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(500)
-    >>> bool(confidence(ball.points, ball.normals, ball.normals).min() > 0.8)
+    >>> bool(confidence(Neighbourhood(ball.points), ball.normals, ball.normals).min() > 0.8)
     True
     """
-    distance = cKDTree(points).query(points, k=min(7, len(points)), workers=-1)[0]
-    spacing = distance[:, 1:].mean(axis=1)
-    width = np.zeros(len(points))
+    spacing = around.spacing
+    width = np.zeros(len(around))
     width[rows] = spacing[rows]
-    outward = DipoleTree(points, spacing**2).outward(normals, width)[rows]
+    outward = around.tree.outward(normals, width)[rows]
     # An infinite plane of dipoles has 4 pi |grad w| = 2 pi / eps with the kernel's width eps.
     jump = np.einsum("nd,nd->n", outward, normals[rows]) * spacing[rows] / (2 * np.pi)
     agreement = 0.5 * (1.0 + np.einsum("nd,nd->n", field[rows], normals[rows]))

@@ -10,13 +10,15 @@ the number is nearly 1 at the surface as well; but a step along the normal leads
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from face_plugin.winding import DipoleTree
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.params import ALPHAS
 
-__all__ = ["automatic_alpha", "enclosed"]
+__all__ = ["automatic_alpha", "enclosed", "threshold"]
 
 # Winding numbers above which a point is enclosed by the others: at the point itself the paper's threshold (the surface
 # has 1/2, its concave edges 3/4); a step outward somewhat more than that of the surface; and there, with the points
@@ -37,9 +39,7 @@ LEAK_PERCENTILE = 90.0
 ALPHA_BOUNDS = (0.03, 0.3)
 
 
-def enclosed(
-    points: NDArray[np.float64], normals: NDArray[np.float64], strength: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which points (n,) the others enclose: the winding number is near 1 there, and still high a step outward.
 
     What lies inside has no outward side and would blur the number. So it is computed again and again, each time without
@@ -48,7 +48,9 @@ def enclosed(
 
     Parameters
     ----------
-    points, normals : (n, 3) float64
+    around : Neighbourhood
+        Of the points.
+    normals : (n, 3) float64
     strength : (n,) float64
         E_max at the points.
 
@@ -56,13 +58,11 @@ def enclosed(
     --------
     >>> from face_plugin.shapes import nested_box
     >>> box = nested_box(2000)
-    >>> found = enclosed(box.points, box.normals, np.where(box.interior, 0.0, 1.0))
+    >>> found = enclosed(Neighbourhood(box.points), box.normals, np.where(box.interior, 0.0, 1.0))
     >>> bool((found == box.interior).mean() > 0.99)
     True
     """
-    distance = cKDTree(points).query(points, k=min(7, len(points)), workers=-1)[0]
-    spacing = distance[:, 1:].mean(axis=1)
-    tree = DipoleTree(points, spacing**2)
+    points, spacing, tree = around.points, around.spacing, around.tree
     width = WIDTH * spacing
     outer = normals
     number = tree.number(outer, width)
@@ -99,3 +99,16 @@ def automatic_alpha(strength: NDArray[np.float64]) -> float:
     if len(strength) == 0:
         return ALPHA_BOUNDS[0]
     return float(np.clip(np.percentile(strength, LEAK_PERCENTILE), *ALPHA_BOUNDS))
+
+
+def threshold(alpha: float | str, strength_of_enclosed: Callable[[], NDArray[np.float64]]) -> float:
+    """Alpha as a number: one that is given, one of the paper's by name, or with "auto" that of `automatic_alpha`.
+
+    Examples
+    --------
+    >>> threshold("sparse", lambda: np.empty(0)), threshold("auto", lambda: np.array([0.1]))
+    (0.05, 0.1)
+    """
+    if alpha == "auto":
+        return automatic_alpha(strength_of_enclosed())
+    return ALPHAS[alpha] if isinstance(alpha, str) else alpha

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.geometry import neighbourhoods, plane_fit, ramp, thin
+from face_plugin.geometry import plane_fit, ramp, thin
+from face_plugin.neighbourhood import Neighbourhood
 
 __all__ = ["Sheets", "back_to_back", "bulk", "cage_separation", "find_sheets", "next_sheet"]
 
@@ -88,24 +89,20 @@ def next_sheet(
     return np.asarray(reach)
 
 
-def back_to_back(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    neighbour: NDArray[np.intp],
-    spacing: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+def back_to_back(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Find the points (n,) of plates thinner than the spacing, which only the field can tell from noise.
 
     In a plate about half of the neighbours face the other way, and nearly all of those lie behind the point, as it
     lies behind them. Where points scatter about one sheet, few face the other way, and as many in front as behind. A
     point belongs to a plate where most of its neighbours have this pattern, so that a plate's rim does, too.
     """
-    near = neighbour[:, 1 : PLATE_NEIGHBOURS + 1]
+    points = around.points
+    near = around.neighbour[:, 1 : PLATE_NEIGHBOURS + 1]
     facing = np.einsum("nkd,nd->nk", normals[near], normals)
     offset = points[near] - points[:, None]
     depth = -np.einsum("nkd,nd->nk", offset, normals)
     behind = (depth > 0) & (np.einsum("nkd,nkd->nk", offset, normals[near]) > 0)
-    behind &= depth < PLATE_THICKNESS * spacing[:, None]
+    behind &= depth < PLATE_THICKNESS * around.spacing[:, None]
     opposite = facing < -SAME_LINE
     count = opposite.sum(axis=1)
     parallel = (np.abs(facing) > SAME_LINE).mean(axis=1)
@@ -129,47 +126,41 @@ class Sheets:
     """(n,) as `bulk` has it."""
 
 
-def find_sheets(points: NDArray[np.float64], distance: NDArray[np.float64], neighbour: NDArray[np.intp]) -> Sheets:
+def find_sheets(around: Neighbourhood) -> Sheets:
     """Look at the neighbours of each point, and farther where those see no other sheet.
 
     Strokes of a sketch are sampled densely and lie many spacings apart: among evenly spaced points, each `FAR_SPACING`
     spacings from the others, the same number of neighbours reaches so much farther.
 
-    Parameters
-    ----------
-    points : (n, 3) float64
-    distance, neighbour : (n, k) float64, (n, k) intp
-        Of the nearest points, ascending, the point itself first; k > 6.
-
     Examples
     --------
     >>> from face_plugin.shapes import slab
-    >>> plate = slab(2000, thickness=0.2).points
-    >>> found = find_sheets(plate, *cKDTree(plate).query(plate, k=97))
+    >>> found = find_sheets(Neighbourhood(slab(2000, thickness=0.2).points))
     >>> bool(0.18 < np.median(found.near) < 0.3)
     True
     """
-    spacing = distance[:, 1:7].mean(axis=1)
-    near = next_sheet(points, distance, neighbour, spacing)
+    points, distance, spacing = around.points, around.distance, around.spacing
+    near = next_sheet(points, distance, around.neighbour, spacing)
     few = points[thin(points, FAR_SPACING * spacing, seed=0)]
     far = near
     if len(few) > BULK_NEIGHBOURS:
-        wide, among = cKDTree(few).query(few, k=min(distance.shape[1], len(few)), workers=-1)
-        beyond = next_sheet(few, wide, among, wide[:, 1:7].mean(axis=1))[cKDTree(few).query(points, workers=-1)[1]]
+        wide = Neighbourhood(few)
+        beyond = next_sheet(few, wide.distance, wide.neighbour, wide.spacing)
+        beyond = beyond[cKDTree(few).query(points, workers=-1)[1]]
         # What was found among the neighbours is nearer than anything that lies beyond them.
         far = np.where(near < distance[:, -1], near, np.maximum(near, beyond))
-    return Sheets(near, far, bulk(points, neighbour))
+    return Sheets(near, far, bulk(points, around.neighbour))
 
 
 def cage_separation(
-    points: NDArray[np.float64], cage_spacing: float | None, *, coarsen: bool = True
+    around: Neighbourhood, cage_spacing: float | None, *, coarsen: bool = True
 ) -> tuple[NDArray[np.float64], Sheets | None]:
-    """Smallest distance (n,) between balls at each point (n, 3), in the points' unit.
+    """Smallest distance (n,) between balls at each point, in the points' unit.
 
     Parameters
     ----------
-    points : (n, 3) float64
-        In the canonical frame, whose longest side is 1.
+    around : Neighbourhood
+        Of the points in the canonical frame, whose longest side is 1.
     cage_spacing : float or None
         The same for all, in the points' unit. None = the larger of two, and 0 for fewer points than 9:
         0.35 x the distance to the 8th neighbour, which removes near-duplicates and keeps even samplings; and, on
@@ -186,21 +177,21 @@ def cage_separation(
 
     Examples
     --------
-    >>> cage_separation(np.eye(3), 0.1)[0]
+    >>> cage_separation(Neighbourhood(np.eye(3)), 0.1)[0]
     array([0.1, 0.1, 0.1])
     """
+    points = around.points
     if cage_spacing is not None:
         return np.full(len(points), cage_spacing), None
     if len(points) < FEWEST:
         return np.zeros(len(points)), None
     if not coarsen:
         return THINNING * cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0], None
-    distance, neighbour = neighbourhoods(points)
-    sheets = find_sheets(points, distance, neighbour)
+    sheets = find_sheets(around)
     # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.
-    around = neighbour[:, : AROUND + 1]
-    reach = np.percentile(sheets.far[around], 25.0, axis=1)
-    on_sheet = 1.0 - np.percentile(ramp(sheets.bulk, CAGE_SHEET)[around], 75.0, axis=1)
-    coarsest = np.minimum(COARSEST * distance[:, 1:7].mean(axis=1), WIDEST)
+    near = around.neighbour[:, : AROUND + 1]
+    reach = np.percentile(sheets.far[near], 25.0, axis=1)
+    on_sheet = 1.0 - np.percentile(ramp(sheets.bulk, CAGE_SHEET)[near], 75.0, axis=1)
+    coarsest = np.minimum(COARSEST * around.spacing, WIDEST)
     coarse = np.minimum(COARSENING * reach * on_sheet, coarsest)
-    return np.asarray(np.maximum(THINNING * distance[:, 8], coarse)), sheets
+    return np.asarray(np.maximum(THINNING * around.distance[:, 8], coarse)), sheets

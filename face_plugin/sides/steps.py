@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.geometry import log_ramp, ramp, unit
+from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.sheets import Sheets
-from face_plugin.winding import DipoleTree
 
 __all__ = ["turn_sides"]
 
@@ -45,12 +45,10 @@ FORGET_ENCLOSED = 0.95
 
 
 def turn_sides(
-    tree: DipoleTree,
+    around: Neighbourhood,
     rough: NDArray[np.float64],
     strength: NDArray[np.float64],
     sheets: Sheets,
-    spacing: NDArray[np.float64],
-    neighbour: NDArray[np.intp],
     kept: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Turn stray normals (n, 3) round; those `kept` stay as they are.
@@ -58,6 +56,7 @@ def turn_sides(
     A side spreads from point to point, across wide gaps slowly: most points settle within a few steps, and what is
     still turning goes on without them.
     """
+    spacing = around.spacing
     flat = 1.0 - ramp(sheets.bulk, SHEET)
     low, high = SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing
     narrow = np.clip(SIDE_WIDTH * sheets.near, low, high)
@@ -71,13 +70,13 @@ def turn_sides(
         width = narrow ** (1.0 - flat) * np.minimum(wide, bound * spacing) ** flat
         width[~turning] = 0.0
         # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
-        outward, number = tree.outward_and_number(normals, width, SIDE_OPENING)
+        outward, number = around.tree.outward_and_number(normals, width, SIDE_OPENING)
         jump = outward * (width / (2.0 * np.pi))[:, None]
         turned = np.where(turning[:, None], unit(jump + vote), normals)
         if step + 1 == FORGET_AFTER:
             turned[~kept & (strength < FORGET_DARK) & (number > FORGET_ENCLOSED)] = 0.0
         if step + 1 >= FORGET_AFTER:
             moved = np.einsum("nd,nd->n", turned, normals) < np.cos(SETTLED)
-            turning = moved[neighbour[:, : AROUND + 1]].any(axis=1) & ~kept
+            turning = moved[around.neighbour[:, : AROUND + 1]].any(axis=1) & ~kept
         normals = turned
     return normals

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.meshers import CageMesh
-from face_plugin.faraday.solve import Clock, solve_level
+from face_plugin.faraday.solve import solve_cage
 from face_plugin.params import Params
 
 __all__ = ["Coarse", "Voxels", "nearest_to_centres", "solve_coarse", "voxel_size"]
@@ -143,7 +143,7 @@ class Coarse:
             return cls(mesh, arrays["potential"], arrays["cage_value"], Locator(mesh))
 
 
-def solve_coarse(voxels: Voxels, params: Params, clock: Clock = lambda stage: None) -> Coarse:
+def solve_coarse(voxels: Voxels, params: Params) -> Coarse:
     """Solve a cage of evenly spaced points over the whole cloud.
 
     Parameters
@@ -151,10 +151,9 @@ def solve_coarse(voxels: Voxels, params: Params, clock: Clock = lambda stage: No
     voxels : Voxels
         The points chosen.
     params : Params
-    clock : callable, optional
     """
     # Neighbouring voxels may hold points that nearly touch: their balls would be small and the gaps beside
     # them wide.
     separation = np.full(len(voxels.points), THINNING * voxels.size)
-    level = solve_level(voxels.points, separation, params, clock=clock)
-    return Coarse(level.mesh, level.potential, level.cage_value, Locator(level.mesh))
+    cage = solve_cage(voxels.points, separation, params)
+    return Coarse(cage.mesh, cage.potential, cage.cage_value, Locator(cage.mesh))

@@ -21,6 +21,7 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from face_plugin.errors import FaceError
+from face_plugin.tiles.tile import warm_up
 
 __all__ = ["Engine", "Job", "Processes", "Serial"]
 
@@ -151,7 +152,7 @@ class Processes:
         # What is not loaded yet, they load while this process prepares the tiles.
         with nullcontext() if forks else _without_main():
             for _ in range(count):
-                self._pool.submit(_warm_up)
+                self._pool.submit(warm_up)
 
     def _stop(self) -> None:
         if self._pool is not None:
@@ -189,12 +190,6 @@ def _follow_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
-
-
-def _warm_up() -> None:
-    from face_plugin.tiles.warm import warm_up
-
-    warm_up()
 
 
 _main_lock = threading.Lock()

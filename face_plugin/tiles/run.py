@@ -16,17 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
 from face_plugin.io.sources import CHUNK, ArraySource, Source
-from face_plugin.params import ALPHAS, Params
+from face_plugin.params import Params
 from face_plugin.result import Progress, Result
 from face_plugin.sides import enclosure
 from face_plugin.tiles.coarse import Voxels, solve_coarse
 from face_plugin.tiles.engines import Engine, Job
 from face_plugin.tiles.plan import EngineLike, make_engine, tile_size
-from face_plugin.tiles.polish import POLISH_STAGES, polish_tile
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.scene import write_far
-from face_plugin.tiles.solve import TILE_STAGES, one_thread, solve_tile
 from face_plugin.tiles.store import Store
+from face_plugin.tiles.tile import ORIENT_STAGES, TILE_STAGES, one_thread, orient_tile, solve_tile
 
 __all__ = ["collect", "estimate_tiled", "solve_store", "tile_seconds"]
 
@@ -160,7 +159,7 @@ def solve_store(
         start = time.perf_counter()
         write_far(solved)
         timings["far"] = time.perf_counter() - start
-        timed("normals", lambda: _run(running, polish_tile, solved, "normals", "normals", report))
+        timed("normals", lambda: _run(running, orient_tile, solved, "normals", "normals", report))
     return store, timings
 
 
@@ -231,34 +230,35 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
     alpha = interior_alpha(store) if store.interior else 0.0
     for tile in range(store.tiles):
         row = rows[store.start[tile] : store.start[tile + 1]]
-        polished = store.read(tile, "normals")
+        oriented = store.read(tile, "normals")
         solved = store.read(tile, "field")
-        out["normals"][row] = store.frame.unrotate(polished["normals"])
-        out["confidence"][row] = polished["confidence"]
+        out["normals"][row] = store.frame.unrotate(oriented["normals"])
+        out["confidence"][row] = oriented["confidence"]
         out["strength"][row] = solved["strength"]
         if store.interior:
             inside = solved["level"] < alpha
-            out["interior"][row] = inside & polished["enclosed"] if store.params.alpha == "auto" else inside
+            out["interior"][row] = inside & oriented["enclosed"] if store.params.alpha == "auto" else inside
     return out
 
 
 def interior_alpha(store: Store) -> float:
     """Field strength below which space is shielded: given, or what the whole cloud shows."""
-    alpha = store.params.alpha
-    if alpha != "auto":
-        return ALPHAS[alpha] if isinstance(alpha, str) else alpha
-    strength = []
-    for tile in range(store.tiles):
-        # What is not enclosed does not count, and need not be kept.
-        deep = store.read(tile, "normals", "enclosed")["enclosed"]
-        strength.append(store.read(tile, "field", "strength")["strength"][deep])
-    return enclosure.automatic_alpha(np.concatenate(strength))
+
+    def of_enclosed() -> NDArray[np.float64]:
+        strength = []
+        for tile in range(store.tiles):
+            # What is not enclosed does not count, and need not be kept.
+            deep = store.read(tile, "normals", "enclosed")["enclosed"]
+            strength.append(store.read(tile, "field", "strength")["strength"][deep])
+        return np.concatenate(strength)
+
+    return enclosure.threshold(store.params.alpha, of_enclosed)
 
 
 def tile_seconds(store: Store) -> dict[str, float]:
     """Processor seconds by stage that the tiles took, all together: those that passed depend on who else works here."""
     seconds: dict[str, float] = {}
-    for stage, names in (("field", TILE_STAGES), ("normals", POLISH_STAGES)):
+    for stage, names in (("field", TILE_STAGES), ("normals", ORIENT_STAGES)):
         for tile in range(store.tiles):
             for name, value in zip(names, store.read(tile, stage, "seconds")["seconds"], strict=True):
                 label = f"tiles: {name}"

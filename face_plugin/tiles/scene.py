@@ -7,7 +7,8 @@ level do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import dataclasses
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin import cloud
+from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.geometry import unit
 from face_plugin.sides.sheets import Sheets
 from face_plugin.tiles.coarse import nearest_to_centres
@@ -29,7 +31,7 @@ WIDTH = 6.0
 NEAR = 3.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
 SHARE = 0.2
-_SHEETS = tuple(field.name for field in fields(Sheets))
+_SHEETS = tuple(field.name for field in dataclasses.fields(Sheets))
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,7 @@ class Scene:
 
     points: NDArray[np.float64]
     """(n, 3) in the canonical frame."""
-    normals: NDArray[np.float64]
-    """(n, 3) gradients of the field strength."""
-    strength: NDArray[np.float64]
-    """(n,) E_max."""
+    field: FieldAtPoints
     own: NDArray[np.intp]
     """(k,) the row of each point that the tile owns."""
     near: NDArray[np.bool_]
@@ -112,8 +111,7 @@ def scene(store: Store, tile: int) -> Scene:
 
     return Scene(
         points[kept],
-        unit(everywhere("normals")),
-        everywhere("strength"),
+        FieldAtPoints(everywhere("strength"), unit(everywhere("normals"))),
         place[near.own],
         moves,
         Sheets(*map(where_it_moves, _SHEETS)) if store.refines else None,

@@ -22,7 +22,7 @@ from face_plugin.params import Params
 
 __all__ = ["Store", "Subset"]
 
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,63 @@
+"""What is near each point of a cloud: found once, and handed from step to step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from face_plugin.winding import DipoleTree
+
+__all__ = ["Neighbourhood"]
+
+# Neighbours looked at around a point: enough to see the next sheet of the surface.
+NEIGHBOURS = 96
+# Nearest neighbours whose mean distance is the spacing.
+NEAREST = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbourhood:
+    """The neighbours of each point, the spacing, and the tree of dipoles; each is found when first asked for.
+
+    Examples
+    --------
+    >>> around = Neighbourhood(np.arange(3.0)[:, None] * np.array([[1.0, 0, 0]]))
+    >>> around.spacing, around.neighbour[0]
+    (array([1.5, 1. , 1.5]), array([0, 1, 2]))
+    """
+
+    points: NDArray[np.float64]
+    """(n, 3) distinct; in Morton order for speed."""
+
+    def __len__(self) -> int:
+        """Return the number n of points."""
+        return len(self.points)
+
+    @cached_property
+    def _found(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        found = cKDTree(self.points).query(self.points, k=min(NEIGHBOURS + 1, len(self.points)), workers=-1)
+        return np.asarray(found[0]), np.asarray(found[1])
+
+    @property
+    def distance(self) -> NDArray[np.float64]:
+        """Distances (n, k) to the nearest points, ascending, the point itself first; k is 97, or n."""
+        return self._found[0]
+
+    @property
+    def neighbour(self) -> NDArray[np.intp]:
+        """Rows (n, k) of the nearest points."""
+        return self._found[1]
+
+    @cached_property
+    def spacing(self) -> NDArray[np.float64]:
+        """Mean distance (n,) to the 6 nearest other points."""
+        return np.asarray(self.distance[:, 1 : NEAREST + 1].mean(axis=1))
+
+    @cached_property
+    def tree(self) -> DipoleTree:
+        """Dipoles at the points, each of the area of a square as wide as the spacing."""
+        return DipoleTree(self.points, self.spacing**2)

@@ -1,0 +1,222 @@
+"""One tile: its cage, the coarse potential on its box, and what follows for the points it owns.
+
+Two stages: what the field says, and, when all tiles have that, what the oriented points say together. The steps are
+those of a cloud in one piece (`face_plugin.method`).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from threadpoolctl import threadpool_limits
+
+from face_plugin.errors import MissingDependencyError, require
+from face_plugin.faraday.domain import Box
+from face_plugin.faraday.gradient import field_at_points
+from face_plugin.faraday.locate import Locator
+from face_plugin.geometry import local_spacing, unit
+from face_plugin.method import orient, solve_field
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.params import Params
+from face_plugin.sides.confidence import confidence
+from face_plugin.sides.enclosure import enclosed
+from face_plugin.sides.sheets import find_sheets
+from face_plugin.tiles.coarse import Coarse
+from face_plugin.tiles.scene import scene
+from face_plugin.tiles.store import Store
+from face_plugin.tiles.surroundings import Surroundings, surroundings
+
+__all__ = ["HALO", "ORIENT_STAGES", "TILE_STAGES", "one_thread", "orient_tile", "solve_tile", "warm_up"]
+
+# Width of the ring of neighbours' points around a tile, in local spacings: behind so many balls the field no
+# longer depends on the boundary data.
+HALO = 6.0
+# The smallest cell of free vertices that is aimed at, as a share of the largest that `Params.finest` allows,
+# and the numbers of cells along the box that are tried for it: with them some power of two is never far.
+FINEST_CELL = 0.65
+CELLS = (4, 5, 6, 7)
+TILE_STAGES = ("cage", "domain", "mesh", "poisson", "field", "normals")
+ORIENT_STAGES = ("scene", "refine", "enclosure", "confidence")
+# Points of the cloud that warms a process up: enough for every neighbourhood that the stages look at.
+WARM_POINTS = 100
+
+# A tile takes a core and its share of the memory; gmsh is one per process anyway.
+_one_at_a_time = threading.Lock()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Run what follows alone in this process, and its libraries on one thread: sums then have one order."""
+    _load_solver()
+    with _one_at_a_time, threadpool_limits(1):
+        yield
+
+
+class Clock:
+    """Processor seconds by stage."""
+
+    def __init__(self) -> None:
+        self._seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Count what runs within for a stage."""
+        start = time.process_time()
+        yield
+        self._seconds[stage] = self._seconds.get(stage, 0.0) + time.process_time() - start
+
+    def of(self, stages: Sequence[str]) -> NDArray[np.float64]:
+        """Seconds (s,) of the stages named."""
+        return np.array([self._seconds.get(stage, 0.0) for stage in stages])
+
+
+@lru_cache(maxsize=1)
+def _load_solver() -> None:
+    """Load the solver's BLAS: only what is loaded can be told how many threads to use."""
+    with suppress(MissingDependencyError):
+        require("sksparse.cholmod", extra="cholmod")
+
+
+@lru_cache(maxsize=1)
+def _coarse(folder: Path, key: str) -> Coarse:
+    return Coarse.load(folder)
+
+
+def solve_tile(folder: str, tile: int) -> int:
+    """Solve one tile of a store and write what it says of its points.
+
+    The outcome depends on the store and on the number of the tile alone, to the last bit: not on the
+    process, nor on how many threads its libraries would use.
+
+    Parameters
+    ----------
+    folder : str
+        Of the store.
+    tile : int
+
+    Returns
+    -------
+    int
+        The tile's number.
+
+    Raises
+    ------
+    MeshingError
+        The tile could not be meshed.
+    """
+    store = Store.load(Path(folder))
+    if not store.done(tile, "field"):
+        with one_thread():
+            store.write(tile, "field", **_solve(store, tile))
+    return tile
+
+
+def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
+    params, clock = store.params, Clock()
+    with clock("cage"):
+        coarse = _coarse(store.folder, store.key)
+        part = surroundings(store, tile, HALO)
+        own = part.points[part.own]
+    solved = solve_field(
+        Neighbourhood(part.points),
+        params,
+        store.frame.scale,
+        box=_box(part, params),
+        given=coarse.at,
+        cage_value=coarse.cage_value,
+        stage=clock,
+    )
+    found: dict[str, NDArray[np.generic]] = {}
+    with clock("field"):
+        if store.refines:
+            # The second stage needs them as well, and to look for them is a fifth of all work.
+            sheets = solved.sheets or find_sheets(Neighbourhood(part.points))
+            found = {name: values[part.own] for name, values in vars(sheets).items()}
+        if store.interior:
+            # Inside an isosurface is where the field is below its value, in the tile's box as everywhere.
+            found["level"] = Locator(solved.cage.mesh).interpolate(own, solved.strength)
+    with clock("normals"):
+        seen = field_at_points(solved.cage.mesh, solved.strength, solved.cage.balls, own)
+        voxels = cKDTree(own).query(store.voxels(tile))[1]
+    return {
+        **found,
+        "strength": seen.strength,
+        "normals": seen.normals,
+        "voxel_rows": voxels,
+        "seconds": clock.of(TILE_STAGES),
+        "balls": np.array([len(solved.cage.balls.radii), len(solved.cage.mesh.vertices)]),
+    }
+
+
+def orient_tile(folder: str, tile: int) -> int:
+    """Orient the normals of one tile of a store, and tell how far they can be trusted and what is enclosed.
+
+    Parameters
+    ----------
+    folder : str
+        Of the store; the first stage of all its tiles is done.
+    tile : int
+
+    Returns
+    -------
+    int
+        The tile's number.
+    """
+    store = Store.load(Path(folder))
+    if not store.done(tile, "normals"):
+        with one_thread():
+            store.write(tile, "normals", **_orient(store, tile))
+    return tile
+
+
+def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
+    clock = Clock()
+    with clock("scene"):
+        seen = scene(store, tile)
+        around = Neighbourhood(seen.points)
+    with clock("refine"):
+        normals = orient(around, seen.field, store.params, plane=store.plane, sheets=seen.sheets, moving=seen.near)
+    found: dict[str, NDArray[np.generic]] = {"normals": normals[seen.own]}
+    with clock("enclosure"):
+        if store.interior:
+            found["enclosed"] = enclosed(around, normals, seen.field.strength)[seen.own]
+    with clock("confidence"):
+        found["confidence"] = confidence(around, seen.field.votes, normals, seen.own)
+    return {**found, "seconds": clock.of(ORIENT_STAGES)}
+
+
+def warm_up() -> None:
+    """Take a small cloud through both stages: libraries and compiled code are then in memory."""
+    ball = unit(np.random.default_rng(0).normal(size=(WARM_POINTS, 3)))
+    with one_thread():
+        around, params = Neighbourhood(ball), Params()
+        solved = solve_field(around, params, 1.0)
+        Locator(solved.cage.mesh).interpolate(ball, solved.strength)
+        seen = field_at_points(solved.cage.mesh, solved.strength, solved.cage.balls, ball)
+        confidence(around, seen.votes, orient(around, seen, params, sheets=solved.sheets))
+
+
+def _box(part: Surroundings, params: Params) -> Box:
+    """Box of a tile, clear of the last balls, cut so that its smallest cells suit the spacing.
+
+    Halving a given size meets the one that is wanted within a factor of two only: too large, and sheets near one
+    another are not told apart; different from tile to tile, and so is the strength.
+    """
+    lower, upper = part.lower - part.spacing, part.upper + part.spacing
+    side = upper - lower
+    wanted = FINEST_CELL * params.finest * float(np.median(local_spacing(part.points)))
+
+    def misses(cells: int) -> float:
+        size = float((side / np.maximum(np.round(side / (side.max() / cells)), 1)).max())
+        octaves = np.log2(size / wanted)
+        return float(abs(octaves - np.round(octaves)))
+
+    return Box(lower, upper, min(CELLS, key=misses))

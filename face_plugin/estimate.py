@@ -14,10 +14,61 @@ from face_plugin.result import Progress, Result, Surface
 from face_plugin.sculpt import SculptFile
 from face_plugin.solver import FaCE
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
-from face_plugin.tiles.plan import EngineLike, in_tiles
-from face_plugin.tiles.run import estimate_tiled
+from face_plugin.tiles.plan import EngineLike, check_one_piece, in_tiles
+from face_plugin.tiles.tiled import Tiled
 
-__all__ = ["estimate_normals", "reconstruct"]
+__all__ = ["estimate_normals", "reconstruct", "solve", "solve_whole"]
+
+
+def solve(
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    classify: bool = False,
+    engine: EngineLike = None,
+    progress: Progress | None = None,
+) -> FaCE | Tiled:
+    """Solve a cloud of any size, in one piece or in tiles as `Params.tile_points` and the memory say.
+
+    Parameters
+    ----------
+    points, params, engine, progress
+        As of `estimate_normals`.
+    classify : bool
+        Whether it will be asked which points are interior: tiles then find it out in the same pass.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> type(solve(sphere(500).points)).__name__
+    'FaCE'
+    """
+    array = cloud.as_points(points)
+    if in_tiles(len(array), params or Params()):
+        return Tiled(array, params, classify=classify, engine=engine, progress=progress)
+    return FaCE(array, params, progress=progress)
+
+
+def solve_whole(
+    points: ArrayLike, params: Params | None = None, *, purpose: str, progress: Progress | None = None
+) -> FaCE:
+    """Solve a cloud in one piece, whatever its size: for edits, and for the field at any position.
+
+    Parameters
+    ----------
+    points, params, progress
+        As of `estimate_normals`.
+    purpose : str
+        What needs it, for the message.
+
+    Raises
+    ------
+    ValueError
+        There is not the memory for it.
+    """
+    array = cloud.as_points(points)
+    check_one_piece(len(array), params or Params(), purpose)
+    return FaCE(array, params, progress=progress)
 
 
 def estimate_normals(
@@ -66,16 +117,14 @@ def estimate_normals(
     >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
-    array = cloud.as_points(points)
-    if sculpt is not None and not isinstance(sculpt, SculptFile):
+    if sculpt is None:
+        solved = solve(points, params, classify=filter_interior, engine=engine, progress=progress)
+        return solved.result(filter_interior=filter_interior)
+    if not isinstance(sculpt, SculptFile):
         # A bad file is said before the cage is solved.
         sculpt = SculptFile.load(sculpt)
-    if sculpt is None and in_tiles(len(array), params or Params()):
-        return estimate_tiled(array, params, filter_interior=filter_interior, engine=engine, progress=progress)
-    face = FaCE(array, params, progress=progress)
-    if sculpt is not None:
-        face = face.sculpted(sculpt)
-    return face.result(filter_interior=filter_interior)
+    face = solve_whole(points, params, purpose="sculpting", progress=progress)
+    return face.sculpted(sculpt).result(filter_interior=filter_interior)
 
 
 def reconstruct(

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.cloud import as_points
-from face_plugin.filters.tiled import Tiled
+from face_plugin.estimate import solve
 from face_plugin.params import Params
 from face_plugin.result import Progress
 from face_plugin.solver import FaCE
-from face_plugin.tiles.plan import in_tiles
+from face_plugin.tiles import Tiled
 
 __all__ = ["Mesh", "PointSet"]
 
@@ -130,10 +130,7 @@ class PointSet:
         """Return the cage of the kept points: the one at hand, unless `params` asks for another."""
         if self.cage is not None and (params is None or params == self.cage.params):
             return self.cage
-        points, settings = self.points[self.keep], params or Params()
-        if in_tiles(len(points), settings):
-            return Tiled(points, settings, classify=self.classify, progress=progress)
-        return FaCE(points, settings, progress=progress)
+        return solve(self.points[self.keep], params, classify=self.classify, progress=progress)
 
     def scatter(self, values: NDArray[Any]) -> NDArray[Any]:
         """Spread values of the kept points over all n rows; the other rows are zero."""

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import ClassVar
 
+from face_plugin.estimate import solve_whole
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
@@ -62,7 +63,7 @@ class Sculpt(Filter):
         cage = layer.solved(self.params, progress)
         if not isinstance(cage, FaCE):
             # Edits need the one mesh that they are made in, whatever its size.
-            cage = FaCE(layer.points[layer.keep], cage.params, progress=progress)
+            cage = solve_whole(layer.points[layer.keep], cage.params, purpose="sculpting", progress=progress)
         return layer.replace(cage=cage.sculpted(self.file))
 
 

@@ -16,6 +16,7 @@ __all__ = [
     "TILE_POINTS",
     "EngineLike",
     "allowed_memory",
+    "check_one_piece",
     "fitting_tile_points",
     "in_tiles",
     "make_engine",
@@ -54,6 +55,31 @@ def in_tiles(count: int, params: Params) -> bool:
     if params.tile_points is not None:
         return count > params.tile_points
     return count > ONE_PIECE or tile_memory(count) > allowed_memory(params)
+
+
+def check_one_piece(count: int, params: Params, purpose: str) -> None:
+    """Refuse to solve a cloud in one piece where the memory does not bear it.
+
+    Parameters
+    ----------
+    count : int
+        Points of the cloud.
+    params : Params
+    purpose : str
+        What needs the cloud in one piece.
+
+    Raises
+    ------
+    ValueError
+        It takes more than `Params.max_memory`, or than all that is free.
+    """
+    free = available_memory() if params.max_memory is None else params.max_memory * GIGABYTE
+    needed = tile_memory(count)
+    if needed > free:
+        raise ValueError(
+            f"points must be few enough for one piece, which {purpose} needs: {count} take about "
+            f"{needed / GIGABYTE:.3g} GB, found {free / GIGABYTE:.3g} GB"
+        )
 
 
 def tile_size(count: int, params: Params) -> int:

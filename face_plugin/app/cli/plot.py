@@ -56,7 +56,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     """Solve, draw and save."""
     from face_plugin.app import plot
     from face_plugin.errors import require
-    from face_plugin.solver import FaCE
+    from face_plugin.estimate import estimate_normals, solve_whole
     from face_plugin.surface import poisson_reconstruction
 
     output = check_output(args.output, plot.PLOT_SUFFIXES)
@@ -65,10 +65,14 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     params, options = params_of(args), surface_of(args)
     with console.stage("read"):
         points = read_cloud(args.input).points
-    face = FaCE(points, params, progress=console.progress)
-    if args.sculpt is not None:
-        face = face.sculpted(args.sculpt)
-    result = face.result(filter_interior=args.interior)
+    if args.interior and args.sculpt is None:
+        result = estimate_normals(points, params, filter_interior=True, progress=console.progress)
+    else:
+        # A slice shows the field between the points.
+        face = solve_whole(points, params, purpose="a slice of the field", progress=console.progress)
+        if args.sculpt is not None:
+            face = face.sculpted(args.sculpt)
+        result = face.result(filter_interior=args.interior)
     looks = {
         "title": args.input.name if args.title is None else args.title,
         "view": args.view,
@@ -90,7 +94,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
             level = _threshold(result.params)
             figure = plot.plot_result(points, result.normals, result.strength, field, alpha=level, **looks)
     plot.save_figure(figure, output)
-    summary.update({"timings": face.timings, "params": result.params.to_dict()})
+    summary.update({"timings": result.timings, "params": result.params.to_dict()})
     return summary, f"{output}: picture of {len(points):,} points"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.cloud import as_points
+from face_plugin.estimate import solve_whole
 from face_plugin.faraday.isosurface import fill_balls, isosurface
 from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
 from face_plugin.params import Params
@@ -88,7 +89,7 @@ class Session:
         first = SculptFile() if sculpt is None else sculpt
         first = first if isinstance(first, SculptFile) else SculptFile.load(first)
         self.points = as_points(points)
-        solved = FaCE(self.points, params, progress=progress)
+        solved = solve_whole(self.points, params, purpose="sculpting", progress=progress)
         # Refining normals takes longer than an edit: they are refined when the surface is made.
         self._angles = solved.params.angles
         self._states = [solved.with_angles("field").sculpted(first)]

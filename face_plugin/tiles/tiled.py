@@ -1,4 +1,4 @@
-"""A cloud too large for one piece, behind the part of `FaCE` that the steps use."""
+"""A cloud too large for one piece, behind the part of `FaCE` that needs no field between the points."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from face_plugin.estimate import estimate_normals
 from face_plugin.params import Params
 from face_plugin.result import Progress, Result
+from face_plugin.tiles.plan import EngineLike
+from face_plugin.tiles.run import estimate_tiled
 
 __all__ = ["Tiled"]
 
@@ -21,9 +22,11 @@ class Tiled:
     Parameters
     ----------
     points : (n, 3) array_like of float or int, in any unit
-    params : Params
+    params : Params, optional
     classify : bool
         Classify the points in the pass for the normals: cheaper than another pass, if it will be asked for.
+    engine : str, Engine or distributed.Client, optional
+        Who solves the tiles; by default `Params.engine`.
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -37,29 +40,33 @@ class Tiled:
     """
 
     def __init__(
-        self, points: ArrayLike, params: Params, *, classify: bool = False, progress: Progress | None = None
+        self,
+        points: ArrayLike,
+        params: Params | None = None,
+        *,
+        classify: bool = False,
+        engine: EngineLike = None,
+        progress: Progress | None = None,
     ) -> None:
-        self.params = params
-        self._points, self._classify, self._progress = points, classify, progress
+        self.params = params or Params()
+        self._points, self._classify, self._engine, self._progress = points, classify, engine, progress
         self._result: Result | None = None
 
-    def result(self) -> Result:
-        """Everything but, unless it was found on the way, the interior points."""
-        if self._result is None:
-            self._result = self._solve(self.params, self._classify)
+    def result(self, *, filter_interior: bool = False) -> Result:
+        """Everything that is known of the points; which are interior where that was, or is now, asked for."""
+        if self._result is None or (filter_interior and self._result.interior is None):
+            self._result = self._solve(self.params, self._classify or filter_interior)
         return self._result
 
     def interior(self, alpha: float | str | None = None) -> NDArray[np.bool_]:
         """Which points (n,) lie inside the object; another `alpha` than that of the settings needs a pass."""
         options: dict[str, Any] = {} if alpha is None else {"alpha": alpha}
         params = dataclasses.replace(self.params, **options)
-        result = self._result if params == self.params else None
-        if result is None or result.interior is None:
-            result = self._solve(params, True)
-            if params == self.params:
-                self._result = result
+        result = self.result(filter_interior=True) if params == self.params else self._solve(params, True)
         assert result.interior is not None  # it was asked for
         return result.interior
 
     def _solve(self, params: Params, classify: bool) -> Result:
-        return estimate_normals(self._points, params, filter_interior=classify, progress=self._progress)
+        return estimate_tiled(
+            self._points, params, filter_interior=classify, engine=self._engine, progress=self._progress
+        )

@@ -1,6 +1,6 @@
 # make demo      a mesh and two pictures of a generated cloud, in out/
 # make test      the tests that take seconds        make test-all   all of them
-# make lint      ruff and mypy                      make bench      the benchmarks
+# make lint      ruff (its format too) and mypy     make bench      the benchmarks
 # Each makes .venv first, and makes it again when pyproject.toml has changed. PYTHON=... chooses the interpreter.
 
 SHELL := /bin/bash
@@ -38,7 +38,15 @@ test-all: $(STAMP)
 
 lint: $(STAMP)
 	@$(BIN)/ruff check .
-	$(BIN)/mypy
+	$(BIN)/ruff format --check .
+	# filters/ and adapters/ lie beside the package and install into it; mypy looks for all of it in one folder.
+	tree=$$(mktemp -d)
+	trap 'rm -rf "$$tree"' EXIT
+	mkdir "$$tree/face_plugin"
+	ln -s "$$PWD"/face_plugin/* "$$PWD/filters" "$$PWD/adapters" "$$tree/face_plugin"
+	repo=$$PWD
+	cd "$$tree"
+	"$$repo/$(BIN)/mypy" --config-file "$$repo/pyproject.toml" --cache-dir "$$repo/.mypy_cache"
 
 bench: $(STAMP)
 	@mkdir -p out

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from face_plugin import estimate
 from face_plugin.errors import require
 from face_plugin.params import Params
+from face_plugin.result import Result
 
 __all__ = ["estimate_normals", "points_of", "reconstruct"]
 
@@ -26,7 +27,7 @@ def points_of(geometry: Any) -> NDArray[Any]:
     return np.asarray(getattr(geometry, "vertices", geometry))
 
 
-def estimate_normals(geometry: Any, params: Params | None = None, **options: Any) -> estimate.Result:
+def estimate_normals(geometry: Any, params: Params | None = None, **options: Any) -> Result:
     """`face_plugin.estimate_normals` of a geometry, which stays as it is.
 
     Parameters

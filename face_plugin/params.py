@@ -81,7 +81,8 @@ class Params:
     """Field strength (unshielded space has 1) below which space counts as inside; (0, 1). "dense" and "sparse" are the
     paper's 0.01 and 0.05; "auto" derives it from the data and spares dents that are open to the outside."""
     inside: Literal["rays", "winding"] = "rays"
-    """Test of a point against the isosurface: embree rays, or the winding number."""
+    """Test of a point against the isosurface: embree rays, or the winding number. Tiles need neither: a point is inside
+    where the field at it is below alpha."""
 
     # Large clouds
     tile_points: int | None = None

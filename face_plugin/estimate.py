@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from face_plugin import cloud
 from face_plugin.params import Params
-from face_plugin.result import Progress, Result, Surface
+from face_plugin.result import Result, Surface
 from face_plugin.sculpt import SculptFile
 from face_plugin.solver import FaCE
+from face_plugin.stages import Progress
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
 from face_plugin.tiles.plan import EngineLike, check_one_piece, in_tiles
 from face_plugin.tiles.tiled import Tiled

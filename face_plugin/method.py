@@ -22,12 +22,13 @@ from face_plugin.angles.turning import kernel_width, turn_angles
 from face_plugin.faraday import field
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.gradient import FieldAtPoints
-from face_plugin.faraday.solve import SolvedCage, Stage, solve_cage
+from face_plugin.faraday.solve import SolvedCage, solve_cage
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.steps import turn_sides
+from face_plugin.stages import Stage
 
 __all__ = ["Solved", "orient", "refine", "solve_field"]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +9,7 @@ from numpy.typing import NDArray
 
 from face_plugin.params import Params
 
-__all__ = ["Progress", "Result", "Surface"]
-
-Progress = Callable[[str, float], None]
-"""Called with the name of a stage and 0.0 at its start, 1.0 at its end."""
+__all__ = ["Result", "Surface"]
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import logging
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,17 +14,69 @@ from face_plugin.faraday import field
 from face_plugin.faraday.gradient import FieldAtPoints, field_at_points
 from face_plugin.faraday.inside import shielded
 from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.solve import SolvedCage
 from face_plugin.method import orient, solve_field
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
-from face_plugin.result import Progress, Result
+from face_plugin.result import Result
 from face_plugin.sculpt.sculptable import Sculptable
+from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence
+from face_plugin.sides.sheets import Sheets
+from face_plugin.stages import Clock, Progress, Stage
 
 __all__ = ["FaCE"]
 
-log = logging.getLogger(__name__)
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What one field says of a cloud, in the canonical frame; each answer is found when first asked for."""
+
+    cage: SolvedCage
+    around: Neighbourhood
+    sheets: Sheets | None
+    plane: NDArray[np.float64] | None
+    params: Params
+    strength: NDArray[np.float64]
+    """(m,) E_max at the vertices of the mesh."""
+    stage: Stage
+
+    @cached_property
+    def seen(self) -> FieldAtPoints:
+        """What the field says of the distinct points."""
+        return field_at_points(self.cage.mesh, self.strength, self.cage.balls, self.around.points)
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Normals of the distinct points (m, 3)."""
+        with self.stage("normals"):
+            return orient(self.around, self.seen, self.params, plane=self.plane, sheets=self.sheets)
+
+    @cached_property
+    def enclosed(self) -> NDArray[np.bool_]:
+        """Which distinct points (m,) the others enclose."""
+        return enclosure.enclosed(self.around, self.normals, self.seen.strength)
+
+    @cached_property
+    def confidence(self) -> NDArray[np.float64]:
+        """Confidence (m,) in the side of the normals."""
+        return confidence(self.around, self.seen.votes, self.normals)
+
+    def threshold(self, alpha: float | str) -> float:
+        """Alpha as a number, which "auto" derives from the leak of the cage."""
+        return enclosure.threshold(alpha, lambda: self.seen.strength[self.enclosed])
+
+    def interior(self, alpha: float | str) -> NDArray[np.bool_]:
+        """Which distinct points (m,) lie inside the object."""
+        level = self.threshold(alpha)
+        with self.stage("interior"):
+            # What alpha is derived from decides as well.
+            inside = self.enclosed.copy() if alpha == "auto" else np.ones(len(self.around), dtype=np.bool_)
+            if inside.any():
+                candidates = self.around.points[inside]
+                inside[inside] = shielded(self.cage.mesh, self.strength, candidates, level, self.params.inside)
+            return inside
 
 
 class FaCE(Sculptable):
@@ -61,46 +110,36 @@ class FaCE(Sculptable):
 
     def __init__(self, points: ArrayLike, params: Params | None = None, *, progress: Progress | None = None) -> None:
         self.params = params or Params()
-        self.timings: dict[str, float] = {}
-        self._progress = progress or (lambda stage, fraction: None)
-        self._solve(points)
-
-    def _solve(self, points: ArrayLike) -> None:
-        with self._stage("cloud"):
+        clock = Clock(progress)
+        self.timings = clock.seconds
+        with clock("cloud"):
             self.cloud = cloud.prepare(points)
             self.frame = self.cloud.frame
-        self._around = Neighbourhood(self.cloud.points)
-        solved = solve_field(self._around, self.params, self.frame.scale, stage=self._stage)
+        around = Neighbourhood(self.cloud.points)
+        solved = solve_field(around, self.params, self.frame.scale, stage=clock)
         self.balls, self.mesh, self.poisson = solved.cage.balls, solved.cage.mesh, solved.cage.poisson
-        self._potential, self.vertex_strength, self._sheets = solved.cage.potential, solved.strength, solved.sheets
+        strength_of = partial(field.strength, self.mesh, directions=self.params.directions)
+        self._sculptor = Sculptor(
+            self.mesh, self.poisson, self.balls, self.cloud, solved.cage.potential, solved.strength, strength_of
+        )
+        plane = self.cloud.plane_normal() if self.cloud.flat else None
+        self._reading = Reading(solved.cage, around, solved.sheets, plane, self.params, solved.strength, clock)
 
-    def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:
-        return field.strength(self.mesh, potential, self.params.directions)
+    def _follow(self) -> None:
+        self._reading = dataclasses.replace(self._reading, params=self.params, strength=self._sculptor.strength)
 
-    @cached_property
-    def _seen(self) -> FieldAtPoints:
-        """What the field says of the distinct points."""
-        return field_at_points(self.mesh, self.vertex_strength, self.balls, self.cloud.points)
-
-    @cached_property
-    def _normals(self) -> NDArray[np.float64]:
-        """Normals of the distinct points (m, 3), in the canonical frame."""
-        with self._stage("normals"):
-            plane = self.cloud.plane_normal() if self.cloud.flat else None
-            return orient(self._around, self._seen, self.params, plane=plane, sheets=self._sheets)
-
-    @cached_property
-    def _enclosed(self) -> NDArray[np.bool_]:
-        """Which distinct points (m,) the others enclose."""
-        return enclosure.enclosed(self._around, self._normals, self._seen.strength)
+    @property
+    def vertex_strength(self) -> NDArray[np.float64]:
+        """E_max (m,) at the vertices of the mesh."""
+        return self._sculptor.strength
 
     def normals(self) -> NDArray[np.floating]:
         """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
-        return self.frame.unrotate(self._normals)[self.cloud.rows].astype(self.cloud.dtype)
+        return self.frame.unrotate(self._reading.normals)[self.cloud.rows].astype(self.cloud.dtype)
 
     def potential(self) -> NDArray[np.float64]:
         """Potentials (m, 3) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""
-        return self._potential
+        return self._sculptor.potential
 
     def strength(self, query: ArrayLike) -> NDArray[np.float64]:
         """E_max at any position, by linear interpolation between the vertices of the mesh.
@@ -137,17 +176,7 @@ class FaCE(Sculptable):
         (n,) bool
         """
         alpha = Params(alpha=self.params.alpha if alpha is None else alpha).alpha  # type: ignore[arg-type]
-        level = self._threshold(alpha)
-        with self._stage("interior"):
-            # What alpha is derived from decides as well.
-            inside = self._enclosed.copy() if alpha == "auto" else np.ones(len(self.cloud.points), dtype=np.bool_)
-            if inside.any():
-                candidates = self.cloud.points[inside]
-                inside[inside] = shielded(self.mesh, self.vertex_strength, candidates, level, self.params.inside)
-            return inside[self.cloud.rows]
-
-    def _threshold(self, alpha: float | str) -> float:
-        return enclosure.threshold(alpha, lambda: self._seen.strength[self._enclosed])
+        return self._reading.interior(alpha)[self.cloud.rows]
 
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
@@ -155,22 +184,12 @@ class FaCE(Sculptable):
         oriented = self.normals()
         params = self.params
         if filter_interior:
-            params = dataclasses.replace(params, alpha=self._threshold(params.alpha))
+            params = dataclasses.replace(params, alpha=self._reading.threshold(params.alpha))
         return Result(
             normals=oriented,
-            strength=self._seen.strength[rows].astype(dtype),
-            confidence=confidence(self._around, self._seen.votes, self._normals)[rows].astype(dtype),
+            strength=self._reading.seen.strength[rows].astype(dtype),
+            confidence=self._reading.confidence[rows].astype(dtype),
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=params,
         )
-
-    @contextmanager
-    def _stage(self, name: str) -> Iterator[None]:
-        """Time a stage, and report its start and end."""
-        self._progress(name, 0.0)
-        start = time.perf_counter()
-        yield
-        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
-        log.debug("%s: %.3f s", name, self.timings[name])
-        self._progress(name, 1.0)

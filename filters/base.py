@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
-from face_plugin.result import Progress
+from face_plugin.stages import Progress
 
 __all__ = ["Filter"]
 

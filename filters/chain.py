@@ -20,7 +20,7 @@ from face_plugin.filters.pointset import PointSet
 from face_plugin.filters.sculpt import Sculpt
 from face_plugin.filters.surface import Surface
 from face_plugin.filters.thin import Thin
-from face_plugin.result import Progress
+from face_plugin.stages import Progress
 
 __all__ = ["FILTERS", "Chain"]
 

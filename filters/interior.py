@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
-from face_plugin.result import Progress
+from face_plugin.stages import Progress
 
 __all__ = ["Interior"]
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from face_plugin.cloud import as_points
 from face_plugin.estimate import solve
 from face_plugin.params import Params
-from face_plugin.result import Progress
 from face_plugin.solver import FaCE
+from face_plugin.stages import Progress
 from face_plugin.tiles import Tiled
 
 __all__ = ["Mesh", "PointSet"]

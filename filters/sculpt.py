@@ -10,8 +10,8 @@ from face_plugin.estimate import solve_whole
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
-from face_plugin.result import Progress
 from face_plugin.solver import FaCE
+from face_plugin.stages import Progress
 
 __all__ = ["Sculpt", "sculpted"]
 

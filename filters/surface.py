@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import Mesh, PointSet
-from face_plugin.result import Progress
+from face_plugin.stages import Progress
 from face_plugin.surface import Backend, poisson_reconstruction
 
 __all__ = ["Surface"]

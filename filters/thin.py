@@ -11,7 +11,7 @@ import numpy as np
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.geometry import thin
-from face_plugin.result import Progress
+from face_plugin.stages import Progress
 
 __all__ = ["Thin"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,13 +19,11 @@ from face_plugin.faraday.meshers.select import build_mesh
 from face_plugin.faraday.poisson import Poisson
 from face_plugin.geometry import local_spacing, thin
 from face_plugin.params import Params
+from face_plugin.stages import Stage
 
-__all__ = ["SolvedCage", "Stage", "solve_cage"]
+__all__ = ["SolvedCage", "solve_cage"]
 
 log = logging.getLogger(__name__)
-
-Stage = Callable[[str], AbstractContextManager[object]]
-"""What a stage of the given name runs in, such as a clock."""
 
 # Another seed turns and jitters everything anew: what made one mesh degenerate is then gone.
 ATTEMPTS = 3

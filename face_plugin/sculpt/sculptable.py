@@ -8,17 +8,11 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from operator import index
 from typing import Literal, SupportsIndex, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from face_plugin.cloud import Cloud
-from face_plugin.faraday.balls import Balls
-from face_plugin.faraday.meshers import CageMesh
-from face_plugin.faraday.poisson import Poisson
 from face_plugin.params import ALPHAS, Params
 from face_plugin.sculpt.file import SculptFile
 from face_plugin.sculpt.sculptor import Edit, Sculptor
@@ -26,9 +20,6 @@ from face_plugin.sculpt.sculptor import Edit, Sculptor
 __all__ = ["Edit", "SculptFile", "Sculptable"]
 
 Solved = TypeVar("Solved", bound="Sculptable")
-
-# What a solved cage remembers through an edit; all else that it remembers follows from the field.
-LASTING = ("locator", "_sculptor")
 
 
 class Sculptable(ABC):
@@ -48,12 +39,7 @@ class Sculptable(ABC):
     """
 
     params: Params
-    cloud: Cloud
-    balls: Balls
-    mesh: CageMesh
-    poisson: Poisson
-    vertex_strength: NDArray[np.float64]
-    _potential: NDArray[np.float64]
+    _sculptor: Sculptor
 
     def add_charges(self, positions: ArrayLike, *, alpha: float | None = None) -> tuple[Edit, ...]:
         """Carve: put a point charge at the vertex of the mesh nearest to each position.
@@ -119,7 +105,7 @@ class Sculptable(ABC):
     @property
     def edits(self) -> tuple[Edit, ...]:
         """The edits in the order in which they were made."""
-        return tuple(self._sculptor.edits.values()) if "_sculptor" in self.__dict__ else ()
+        return tuple(self._sculptor.edits.values())
 
     def remove_edits(self, edits: Iterable[Edit | SupportsIndex] | Edit | SupportsIndex) -> None:
         """Take edits back, one or several, given as such or by their numbers.
@@ -159,7 +145,7 @@ class Sculptable(ABC):
         if not isinstance(sculpt, SculptFile):
             source, sculpt = f"{os.fspath(sculpt)}: ", SculptFile.load(sculpt)
         twin = copy.copy(self)
-        twin.__dict__["_sculptor"] = self._sculptor.copy()
+        twin._sculptor = self._sculptor.copy()
         # Cage points first: a charge is not to be put where they grow to.
         with _naming(f"{source}cage_points: "):
             if sculpt.cage_points:
@@ -185,29 +171,9 @@ class Sculptable(ABC):
         twin._follow()
         return twin
 
-    @cached_property
-    def _sculptor(self) -> Sculptor:
-        return Sculptor(
-            self.mesh,
-            self.poisson,
-            self.balls,
-            self.cloud,
-            self._potential,
-            self.vertex_strength,
-            self._strength_of,
-        )
-
     @abstractmethod
-    def _strength_of(self, potential: NDArray[np.float64]) -> NDArray[np.float64]:
-        """E_max (m,) over all external fields, from the potentials (m, 3) of the basis."""
-
     def _follow(self) -> None:
-        """Take over the field with its edits, and forget what followed from the one before."""
-        self._potential, self.vertex_strength = self._sculptor.potential, self._sculptor.strength
-        for kind in type(self).__mro__:
-            for name, member in vars(kind).items():
-                if isinstance(member, cached_property) and name not in LASTING:
-                    self.__dict__.pop(name, None)
+        """Take over the settings, and the field with its edits."""
 
 
 @contextmanager

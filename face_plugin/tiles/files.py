@@ -17,7 +17,7 @@ from face_plugin.io.cloudfile import replacing
 from face_plugin.io.sinks import WRITERS, Columns
 from face_plugin.io.sources import STREAMED, Source, open_source
 from face_plugin.params import Params
-from face_plugin.result import Progress
+from face_plugin.stages import Progress
 from face_plugin.tiles.plan import PROCESS_BYTES, EngineLike, allowed_memory
 from face_plugin.tiles.run import collect, solve_store
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 import dataclasses
 import logging
 import tempfile
-import time
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from face_plugin import cloud
 from face_plugin.io.sources import CHUNK, ArraySource, Source
 from face_plugin.params import Params
-from face_plugin.result import Progress, Result
+from face_plugin.result import Result
 from face_plugin.sides import enclosure
+from face_plugin.stages import Clock, Progress
 from face_plugin.tiles.coarse import Voxels, solve_coarse
 from face_plugin.tiles.engines import Engine, Job
 from face_plugin.tiles.plan import EngineLike, make_engine, tile_size
@@ -134,33 +132,23 @@ def solve_store(
     ValueError
         With `resume`: the folder holds work on another input or with other settings.
     """
-    report = progress or (lambda stage, fraction: None)
-    timings: dict[str, float] = {}
-
-    def timed(stage: str, call: Callable[[], Any]) -> Any:
-        start = time.perf_counter()
-        report(stage, 0.0)
-        value = call()
-        timings[stage] = time.perf_counter() - start
-        report(stage, 1.0)
-        return value
-
+    clock, report = Clock(progress), progress or (lambda stage, fraction: None)
     key = store_key(source, params, classify)
     store = _found(folder, key) if resume else None
     points = tile_size(source.count, params)
     with make_engine(engine, params, points, source.count) as running:
         if store is None:
-            fill = partial(fill_store, folder, source, params, points, interior=classify, key=key, chunk=chunk)
-            store, voxels = timed("cloud", fill)
-            timed("coarse", lambda: _solve_coarse(voxels, params, folder))
+            with clock("cloud"):
+                store, voxels = fill_store(folder, source, params, points, interior=classify, key=key, chunk=chunk)
+            with clock("coarse"):
+                _solve_coarse(voxels, params, folder)
             store.save()
-        solved: Store = store
-        timed("tiles", lambda: _run(running, solve_tile, solved, "field", "tiles", report))
-        start = time.perf_counter()
-        write_far(solved)
-        timings["far"] = time.perf_counter() - start
-        timed("normals", lambda: _run(running, orient_tile, solved, "normals", "normals", report))
-    return store, timings
+        with clock("tiles"):
+            _run(running, solve_tile, store, "field", "tiles", report)
+        with clock("normals"):
+            write_far(store)
+            _run(running, orient_tile, store, "normals", "normals", report)
+    return store, clock.seconds
 
 
 def _solve_coarse(voxels: Voxels, params: Params, folder: Path) -> None:

@@ -29,6 +29,7 @@ from face_plugin.params import Params
 from face_plugin.sides.confidence import confidence
 from face_plugin.sides.enclosure import enclosed
 from face_plugin.sides.sheets import find_sheets
+from face_plugin.stages import Clock
 from face_plugin.tiles.coarse import Coarse
 from face_plugin.tiles.scene import scene
 from face_plugin.tiles.store import Store
@@ -58,24 +59,6 @@ def one_thread() -> Iterator[None]:
     _load_solver()
     with _one_at_a_time, threadpool_limits(1):
         yield
-
-
-class Clock:
-    """Processor seconds by stage."""
-
-    def __init__(self) -> None:
-        self._seconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        """Count what runs within for a stage."""
-        start = time.process_time()
-        yield
-        self._seconds[stage] = self._seconds.get(stage, 0.0) + time.process_time() - start
-
-    def of(self, stages: Sequence[str]) -> NDArray[np.float64]:
-        """Seconds (s,) of the stages named."""
-        return np.array([self._seconds.get(stage, 0.0) for stage in stages])
 
 
 @lru_cache(maxsize=1)
@@ -120,7 +103,7 @@ def solve_tile(folder: str, tile: int) -> int:
 
 
 def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
-    params, clock = store.params, Clock()
+    params, clock = store.params, Clock(now=time.process_time)
     with clock("cage"):
         coarse = _coarse(store.folder, store.key)
         part = surroundings(store, tile, HALO)
@@ -151,7 +134,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         "strength": seen.strength,
         "normals": seen.normals,
         "voxel_rows": voxels,
-        "seconds": clock.of(TILE_STAGES),
+        "seconds": _seconds(clock, TILE_STAGES),
         "balls": np.array([len(solved.cage.balls.radii), len(solved.cage.mesh.vertices)]),
     }
 
@@ -178,7 +161,7 @@ def orient_tile(folder: str, tile: int) -> int:
 
 
 def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
-    clock = Clock()
+    clock = Clock(now=time.process_time)
     with clock("scene"):
         seen = scene(store, tile)
         around = Neighbourhood(seen.points)
@@ -190,7 +173,11 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
             found["enclosed"] = enclosed(around, normals, seen.field.strength)[seen.own]
     with clock("confidence"):
         found["confidence"] = confidence(around, seen.field.votes, normals, seen.own)
-    return {**found, "seconds": clock.of(ORIENT_STAGES)}
+    return {**found, "seconds": _seconds(clock, ORIENT_STAGES)}
+
+
+def _seconds(clock: Clock, stages: Sequence[str]) -> NDArray[np.float64]:
+    return np.array([clock.seconds.get(stage, 0.0) for stage in stages])
 
 
 def warm_up() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.params import Params
-from face_plugin.result import Progress, Result
+from face_plugin.result import Result
+from face_plugin.stages import Progress
 from face_plugin.tiles.plan import EngineLike
 from face_plugin.tiles.run import estimate_tiled
 

@@ -14,9 +14,9 @@ from face_plugin.estimate import solve_whole
 from face_plugin.faraday.isosurface import fill_balls, isosurface
 from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
 from face_plugin.params import Params
-from face_plugin.result import Progress
 from face_plugin.sculpt import Edit, SculptFile
 from face_plugin.solver import FaCE
+from face_plugin.stages import Progress
 from face_plugin.surface import poisson_reconstruction
 
 __all__ = ["MODES", "Mode", "Plane", "Session"]

@@ -46,7 +46,7 @@ lint: $(STAMP)
 	ln -s "$$PWD"/face_plugin/* "$$PWD/filters" "$$PWD/adapters" "$$tree/face_plugin"
 	repo=$$PWD
 	cd "$$tree"
-	"$$repo/$(BIN)/mypy" --config-file "$$repo/pyproject.toml" --cache-dir "$$repo/.mypy_cache"
+	"$(abspath $(BIN))/mypy" --config-file "$$repo/pyproject.toml" --cache-dir "$$repo/.mypy_cache"
 
 bench: $(STAMP)
 	@mkdir -p out

@@ -5,10 +5,9 @@ import logging
 import numpy as np
 import pytest
 
-from face_plugin import surface_size
+from face_plugin import surface
 from face_plugin.shapes import sphere
-from face_plugin.surface import poisson_reconstruction
-from face_plugin.surface_size import reconstruction_memory, suggested_depth, warn_if_too_large
+from face_plugin.surface import poisson_reconstruction, reconstruction_memory, suggested_depth, warn_if_too_large
 
 
 def random_sphere(n):
@@ -41,7 +40,7 @@ def test_a_warning_with_numbers(monkeypatch, caplog):
     points = random_sphere(5000)
     warn_if_too_large(points, 6)
     assert not caplog.records
-    monkeypatch.setattr(surface_size, "available_memory", lambda: 1e6)
+    monkeypatch.setattr(surface, "available_memory", lambda: 1e6)
     with caplog.at_level(logging.WARNING):
         warn_if_too_large(points, 9)
     assert "depth 9 from 5000 points takes about 0.0" in caplog.text

@@ -16,7 +16,7 @@ __all__ = ["Neighbourhood"]
 # Neighbours looked at around a point: enough to see the next sheet of the surface.
 NEIGHBOURS = 96
 # Nearest neighbours whose mean distance is the spacing.
-NEAREST = 6
+SPACING_NEIGHBOURS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Neighbourhood:
     @cached_property
     def spacing(self) -> NDArray[np.float64]:
         """Mean distance (n,) to the 6 nearest other points."""
-        return np.asarray(self.distance[:, 1 : NEAREST + 1].mean(axis=1))
+        return np.asarray(self.distance[:, 1 : SPACING_NEIGHBOURS + 1].mean(axis=1))
 
     @cached_property
     def tree(self) -> DipoleTree:

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 # Another seed turns and jitters everything anew: what made one mesh degenerate is then gone.
 ATTEMPTS = 3
 # A ball reaches at most this fraction of its way to a given box: beyond, it would cut through it.
-REACH = 0.45
+BOX_REACH = 0.45
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def _mesh(
 def _within(balls: Balls, box: Box) -> Balls:
     """Shrink the balls that would reach the box: an isolated point near it has a large one."""
     room = np.minimum(balls.centres - box.lower, box.upper - balls.centres).min(axis=1)
-    radii = np.minimum(balls.radii, REACH * room)
+    radii = np.minimum(balls.radii, BOX_REACH * room)
     factor = (radii / balls.radii)[:, None, None]
     centres = balls.centres[:, None]
     return dataclasses.replace(balls, radii=radii, vertices=centres + factor * (balls.vertices - centres))

@@ -29,7 +29,7 @@ BY_ALL = 0.35
 # Length of the step, in spacings: what lies less deep than about that counts as surface.
 STEP = 1.0
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
-WIDTH = 0.5
+ENCLOSED_WIDTH = 0.5
 # Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which
 # rises as the numbers get clearer. No dent that is open to the outside is as dark.
 DARK = 1e-4
@@ -63,7 +63,7 @@ def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDAr
     True
     """
     points, spacing, tree = around.points, around.spacing, around.tree
-    width = WIDTH * spacing
+    width = ENCLOSED_WIDTH * spacing
     outer = normals
     number = tree.number(outer, width)
     left_out = np.zeros(len(points), dtype=np.bool_)

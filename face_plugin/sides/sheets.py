@@ -31,15 +31,15 @@ PLATE_MAJORITY = 0.4
 SAME_LINE = 0.7
 # Smallest distance between balls, as a fraction of the distance to the 8th neighbour. Even samplings keep every point
 # and so do both sides of a plate down to 0.4 spacings; near-duplicates of registered scans go.
-THINNING = 0.35
+DUPLICATE = 0.35
 # On a sheet, as a fraction of the distance to the next one, at most so many spacings and so much of the longest side.
 COARSENING = 0.3
 COARSEST = 4.0
-WIDEST = 0.04
+COARSEST_SHARE = 0.04
 # A sheet is where `bulk` is below these values, fully and not at all.
 CAGE_SHEET = (0.02, 0.1)
 # Neighbours among which the least favourable quarter decides.
-AROUND = 12
+CAGE_AROUND = 12
 # Fewer points than this have no 8th neighbour.
 FEWEST = 9
 
@@ -186,12 +186,12 @@ def cage_separation(
     if len(points) < FEWEST:
         return np.zeros(len(points)), None
     if not coarsen:
-        return THINNING * cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0], None
+        return DUPLICATE * cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0], None
     sheets = find_sheets(around)
     # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.
-    near = around.neighbour[:, : AROUND + 1]
+    near = around.neighbour[:, : CAGE_AROUND + 1]
     reach = np.percentile(sheets.far[near], 25.0, axis=1)
     on_sheet = 1.0 - np.percentile(ramp(sheets.bulk, CAGE_SHEET)[near], 75.0, axis=1)
-    coarsest = np.minimum(COARSEST * around.spacing, WIDEST)
+    coarsest = np.minimum(COARSEST * around.spacing, COARSEST_SHARE)
     coarse = np.minimum(COARSENING * reach * on_sheet, coarsest)
-    return np.asarray(np.maximum(THINNING * around.distance[:, 8], coarse)), sheets
+    return np.asarray(np.maximum(DUPLICATE * around.distance[:, 8], coarse)), sheets

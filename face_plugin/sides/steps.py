@@ -18,18 +18,18 @@ from face_plugin.sides.sheets import Sheets
 
 __all__ = ["turn_sides"]
 
-# Side: most steps taken, fewer where neither a point nor one of its nearest AROUND turned by more than SETTLED, in
-# radians, in a step; kernel width as a fraction of the distance to the next sheet, and its bounds in spacings.
+# Most steps taken, fewer where neither a point nor one of its nearest SETTLED_AROUND turned by more than SETTLED (in
+# radians) in a step; kernel width as a fraction of the distance to the next sheet, and its bounds in spacings.
 SIDE_STEPS = 36
 SETTLED = 0.05
-AROUND = 8
+SETTLED_AROUND = 8
 # The side bears a coarser sum than the angle: about twice as fast, one to two degrees off.
 SIDE_OPENING = 0.6
 SIDE_WIDTH = 0.3
 SIDE_BOUNDS = (0.3, 3.0)
 # On a sheet the kernel may reach farther, to strokes many spacings away: at first up to this many spacings, then less
 # and less, down to the bound above. A sheet is where `bulk` is below these values, fully and not at all.
-WIDEST = 6.0
+WIDEST_KERNEL = 6.0
 SHEET = (0.03, 0.1)
 # The field keeps a vote, next to the unit jump of the winding number, where points form no sheet (`bulk` from, to) and
 # stand out into the field (E_max from, to): bars thinner than the spacing, which look like noise but for their field.
@@ -66,7 +66,7 @@ def turn_sides(
     normals = rough
     turning = ~kept
     for step in range(SIDE_STEPS):
-        bound = WIDEST * (SIDE_BOUNDS[1] / WIDEST) ** (step / SIDE_STEPS)
+        bound = WIDEST_KERNEL * (SIDE_BOUNDS[1] / WIDEST_KERNEL) ** (step / SIDE_STEPS)
         width = narrow ** (1.0 - flat) * np.minimum(wide, bound * spacing) ** flat
         width[~turning] = 0.0
         # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
@@ -77,6 +77,6 @@ def turn_sides(
             turned[~kept & (strength < FORGET_DARK) & (number > FORGET_ENCLOSED)] = 0.0
         if step + 1 >= FORGET_AFTER:
             moved = np.einsum("nd,nd->n", turned, normals) < np.cos(SETTLED)
-            turning = moved[around.neighbour[:, : AROUND + 1]].any(axis=1) & ~kept
+            turning = moved[around.neighbour[:, : SETTLED_AROUND + 1]].any(axis=1) & ~kept
         normals = turned
     return normals

@@ -16,9 +16,9 @@ from face_plugin.params import Params
 
 __all__ = ["Coarse", "Voxels", "nearest_to_centres", "solve_coarse", "voxel_size"]
 
-# Occupied voxels a point of the coarse cage: thinning them at THINNING voxels leaves about this share.
+# Occupied voxels a point of the coarse cage: thinning them at VOXELS_APART voxels leaves about this share.
 VOXELS_PER_POINT = 1.7
-THINNING = 0.8
+VOXELS_APART = 0.8
 # Bits of a voxel's index along an axis.
 BITS = 21
 # Voxels along the longest side that the search starts from.
@@ -154,6 +154,6 @@ def solve_coarse(voxels: Voxels, params: Params) -> Coarse:
     """
     # Neighbouring voxels may hold points that nearly touch: their balls would be small and the gaps beside
     # them wide.
-    separation = np.full(len(voxels.points), THINNING * voxels.size)
+    separation = np.full(len(voxels.points), VOXELS_APART * voxels.size)
     cage = solve_cage(voxels.points, separation, params)
     return Coarse(cage.mesh, cage.potential, cage.cage_value, Locator(cage.mesh))

@@ -26,7 +26,7 @@ from face_plugin.tiles.surroundings import surroundings
 __all__ = ["Scene", "scene", "write_far"]
 
 # Width of the full ring around a tile, in its spacings.
-WIDTH = 6.0
+RING_WIDTH = 6.0
 # Width of the part of it in which normals move.
 NEAR = 3.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
@@ -78,8 +78,8 @@ def scene(store: Store, tile: int) -> Scene:
         The first stage of all its tiles is done.
     tile : int
     """
-    near = surroundings(store, tile, WIDTH)
-    reach = WIDTH * near.spacing
+    near = surroundings(store, tile, RING_WIDTH)
+    reach = RING_WIDTH * near.spacing
     middle = store.within(near.lower - store.voxel / SHARE, near.upper + store.voxel / SHARE)
     far = _far(store.folder, store.key)
 

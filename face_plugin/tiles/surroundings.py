@@ -17,7 +17,7 @@ __all__ = ["Surroundings", "surroundings"]
 QUANTILE = 0.9
 # The ring is thinned to this share of that spacing: beside a much denser tile it would outweigh the tile
 # itself.
-THINNING = 0.5
+RING_SPACING = 0.5
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def surroundings(store: Store, tile: int, width: float) -> Surroundings:
     place[order] = np.cumsum(leads) - 1
     owned = np.flatnonzero(subset.tile == tile)
     rows = place[owned[np.argsort(subset.row[owned])]]
-    separation = np.full(len(leader), THINNING * spacing)
+    separation = np.full(len(leader), RING_SPACING * spacing)
     separation[rows] = 0.0
     kept = thin(subset.points[leader], separation, store.params.seed)
     leader = leader[kept]

@@ -16,10 +16,10 @@ from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.meshers.boundary import ball_volumes, tet_volumes
+from face_plugin.memory import GIGABYTE
 
 __all__ = ["check_balls", "check_memory", "check_mesh"]
 
-GIGABYTE = 1e9
 # Mesh coordinates are of order one. Outside this range gmsh aborts the process: its predicates overflow.
 BOX_SIDES = (1e-6, 1e6)
 # Relative error of the volume of the mesh: a few rounding errors a tetrahedron.

@@ -15,7 +15,7 @@ from face_plugin.io.lascheck import check_las
 from face_plugin.io.names import COLOUR, with_colours
 
 # The names under which PDAL and CloudCompare keep normals in extra bytes.
-_NORMAL = ("NormalX", "NormalY", "NormalZ")
+LAS_NORMAL = ("NormalX", "NormalY", "NormalZ")
 
 
 def read(path: Path) -> CloudFile:
@@ -32,11 +32,11 @@ def read(path: Path) -> CloudFile:
         # Rust's): all of them mean that this is not a file of points.
         raise malformed(path, path.suffix[1:].upper(), error) from error
     names = list(las.point_format.dimension_names)
-    has_normals = all(name in names for name in _NORMAL)
-    skip = {"X", "Y", "Z", *(_NORMAL if has_normals else ())}
+    has_normals = all(name in names for name in LAS_NORMAL)
+    skip = {"X", "Y", "Z", *(LAS_NORMAL if has_normals else ())}
     return CloudFile(
         points=points,
-        normals=np.stack([np.asarray(las[name]) for name in _NORMAL], axis=1) if has_normals else None,
+        normals=np.stack([np.asarray(las[name]) for name in LAS_NORMAL], axis=1) if has_normals else None,
         attributes={name: np.asarray(las[name]) for name in names if name not in skip},
         suffix=path.suffix.lower(),
         source=las,
@@ -55,10 +55,10 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
         las.evlrs = [vlr for vlr in las.evlrs or [] if vlr.user_id != "copc"] or None
         new = {name: values for name, values in attributes.items() if name in extra}
     else:
-        las = _fresh(laspy, points)
+        las = new_las(laspy, points)
         new = attributes if _has_wide_colours(attributes) else with_colours(attributes)
     if normals is not None:
-        new = {**new, **{name: normals[:, k].astype(np.float32) for k, name in enumerate(_NORMAL)}}
+        new = {**new, **{name: normals[:, k].astype(np.float32) for k, name in enumerate(LAS_NORMAL)}}
     present = set(las.point_format.dimension_names)
     added = [
         laspy.ExtraBytesParams(name=name[:32], type=np.uint8 if values.dtype.kind == "b" else values.dtype)
@@ -70,7 +70,7 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
     present = set(las.point_format.dimension_names)
     for name, values in new.items():
         if name[:32] in present:
-            las[name[:32]] = _colour(values) if name in COLOUR else values
+            las[name[:32]] = colour_16_bit(values) if name in COLOUR else values
     las.write(str(path))
 
 
@@ -78,12 +78,12 @@ def _has_wide_colours(attributes: Mapping[str, Array]) -> bool:
     return all(name in attributes and attributes[name].dtype == np.uint16 for name in COLOUR)
 
 
-def _colour(values: Array) -> Array:
+def colour_16_bit(values: Array) -> Array:
     """Colours in LAS have 16 bits; those of 8 bits are spread over them."""
     return values.astype(np.uint16) * 257 if values.dtype == np.uint8 else values
 
 
-def _fresh(laspy: ModuleType, points: Array) -> Any:
+def new_las(laspy: ModuleType, points: Array) -> Any:
     """Make a LAS of point format 7 whose integer grid is as fine as the extent of the points allows."""
     low, extent = np.zeros(3), np.ones(3)
     if len(points):

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import require
-from face_plugin.io.las import _NORMAL as _LAS_NORMAL
-from face_plugin.io.las import _colour, _fresh
+from face_plugin.io.las import LAS_NORMAL, colour_16_bit, new_las
+from face_plugin.io.names import NORMAL, POINT
 from face_plugin.io.plydata import PlyData
 from face_plugin.io.plywrite import binary_rows, element
 from face_plugin.io.sources import LasSource, Source
@@ -22,9 +22,7 @@ Array = NDArray[Any]
 Columns = dict[str, Array]
 """x, y, z, the normals nx, ny, nz, and any other values of some points, by name."""
 
-_POINT = ("x", "y", "z")
-_NORMAL = ("nx", "ny", "nz")
-_LAS_NAMES = dict(zip(_NORMAL, _LAS_NORMAL, strict=True))
+_LAS_NAMES = dict(zip(NORMAL, LAS_NORMAL, strict=True))
 
 
 def _npy(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
@@ -32,7 +30,7 @@ def _npy(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
     out: Any = None
     seen = 0
     for part in parts:
-        names = [*_POINT, *_NORMAL, *(name for name in part if name not in _POINT + _NORMAL)]
+        names = [*POINT, *NORMAL, *(name for name in part if name not in POINT + NORMAL)]
         block = np.stack([part[name] for name in names if part[name].dtype.kind in "fiub"], axis=1)
         if out is None:
             shape = (count, block.shape[1])
@@ -74,8 +72,8 @@ def _las(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
                 writer = laspy.open(str(path), mode="w", header=header, do_compress=compress)
             records = laspy.ScaleAwarePointRecord.zeros(len(named["x"]), header=header)
             for name, values in named.items():
-                if name in _POINT or name in set(header.point_format.dimension_names):
-                    records[name] = _colour(values) if name in ("red", "green", "blue") else values
+                if name in POINT or name in set(header.point_format.dimension_names):
+                    records[name] = colour_16_bit(values) if name in ("red", "green", "blue") else values
             writer.write_points(records)
     finally:
         if writer is not None:
@@ -89,8 +87,8 @@ def _las_header(laspy: Any, part: Columns, source: Source) -> Any:
             header = reader.header
     else:
         corners = np.concatenate([[p.min(axis=0), p.max(axis=0)] for p, _ in source.parts()])
-        header = _fresh(laspy, corners).header
-    known = {*_POINT, *header.point_format.dimension_names}
+        header = new_las(laspy, corners).header
+    known = {*POINT, *header.point_format.dimension_names}
     for name, values in part.items():
         if name not in known and values.dtype.kind in "fiub":
             kind = np.dtype(np.uint8) if values.dtype.kind == "b" else values.dtype

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from face_plugin import cloud
 from face_plugin.faraday import field
 from face_plugin.faraday.gradient import FieldAtPoints, field_at_points
-from face_plugin.faraday.inside import shielded
+from face_plugin.faraday.isosurface import shielded
 from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.solve import SolvedCage
 from face_plugin.method import orient, solve_field

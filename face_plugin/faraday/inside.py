@@ -24,10 +24,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from face_plugin.faraday.isosurface import fill_balls, isosurface
-from face_plugin.faraday.meshers import CageMesh
-
-__all__ = ["inside", "inside_by_rays", "inside_by_winding", "shielded"]
+__all__ = ["inside", "inside_by_rays", "inside_by_winding"]
 
 log = logging.getLogger(__name__)
 
@@ -39,29 +36,6 @@ _JITTER = 0.1
 """Random turn of each ray, in radians, so that no ray runs along edges that are aligned with others."""
 _RAYS_AT_ONCE = 1 << 20
 """How many rays are in memory at a time."""
-
-
-def shielded(
-    mesh: CageMesh,
-    strength: NDArray[np.float64],
-    points: NDArray[np.float64],
-    alpha: float,
-    method: Literal["rays", "winding"],
-) -> NDArray[np.bool_]:
-    """Which points (n,) the alpha-isosurface of E_max encloses (paper section 3.5).
-
-    Parameters
-    ----------
-    mesh : CageMesh
-    strength : (m,) float64
-        E_max at the vertices of the mesh.
-    points : (n, 3) float64
-        In the frame of the mesh.
-    alpha : float
-    method : {"rays", "winding"}
-    """
-    surface = isosurface(*fill_balls(mesh, strength), alpha)
-    return inside(points, *surface, method=method)
 
 
 def inside(

@@ -7,14 +7,15 @@ FaCE calls a point interior where the isosurface of the field strength encloses 
 from __future__ import annotations
 
 from itertools import permutations
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from face_plugin.faraday.inside import inside
 from face_plugin.faraday.meshers import CageMesh
 
-__all__ = ["fill_balls", "isosurface"]
+__all__ = ["fill_balls", "isosurface", "shielded"]
 
 # Row k: the face opposite to vertex k of a positive tetrahedron, wound so that it faces outwards.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -39,6 +40,29 @@ def _table(cuts: list[list[str]]) -> NDArray[np.int64]:
                     ends = [order[int(vertex)] for vertex in triangle.replace(" ", "")]
                     table[case, row] = np.reshape(ends, (3, 2))
     return table
+
+
+def shielded(
+    mesh: CageMesh,
+    strength: NDArray[np.float64],
+    points: NDArray[np.float64],
+    alpha: float,
+    method: Literal["rays", "winding"],
+) -> NDArray[np.bool_]:
+    """Which points (n,) the alpha-isosurface of E_max encloses (paper section 3.5).
+
+    Parameters
+    ----------
+    mesh : CageMesh
+    strength : (m,) float64
+        E_max at the vertices of the mesh.
+    points : (n, 3) float64
+        In the frame of the mesh.
+    alpha : float
+    method : {"rays", "winding"}
+    """
+    surface = isosurface(*fill_balls(mesh, strength), alpha)
+    return inside(points, *surface, method=method)
 
 
 def isosurface(

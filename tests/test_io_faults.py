@@ -159,6 +159,14 @@ def test_records_that_are_no_coordinates(tmp_path: Path, field: tuple[str, ...])
         read_cloud(tmp_path / "a.npy")
 
 
+def test_members_that_are_no_arrays_are_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    names = np.array(["", ""])
+    np.savez(tmp_path / "a.npz", points=made.POINTS, names=names, meta=np.array({"a": 1}, dtype=object))
+    cloud = read_cloud(tmp_path / "a.npz")
+    np.testing.assert_array_equal(cloud.points, made.POINTS)
+    assert "'meta.npy' holds Python objects" in caplog.text
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot limit the size of files")
 @pytest.mark.parametrize("suffix", CLOUD_SUFFIXES)
 def test_full_disk_names_the_path(tmp_path: Path, suffix: str) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import logging
 import zipfile
 from collections.abc import Mapping
-from io import BufferedReader
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 import numpy as np
 
@@ -26,9 +25,8 @@ def read(path: Path) -> CloudFile:
     kind = path.suffix[1:].upper()
     try:
         if path.suffix.lower() == ".npz":
-            return _from_npz(path, _members(path))
-        with open(path, "rb") as stream:
-            loaded = _load(stream, path.stat().st_size)
+            return _from_npz(path, *_members(path))
+        loaded = load_npy(path)
     except (ValueError, EOFError, KeyError, OverflowError, MemoryError, zipfile.BadZipFile) as error:
         if str(error).startswith(f"{path}: "):
             raise
@@ -46,30 +44,53 @@ def read(path: Path) -> CloudFile:
     )
 
 
-def _load(stream: IO[bytes], size: int) -> Array:
-    """Read one array, after its header was held against the bytes that there are."""
-    version = np.lib.format.read_magic(stream)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, fortran, dtype = read(stream)
+def load_npy(path: Path, *, mapped: bool = False) -> Array:
+    """Read an NPY file, or leave its rows on the disk.
+
+    Raises
+    ------
+    ValueError
+        It is damaged, or claims more than the file has.
+    """
+    size = path.stat().st_size
+    with open(path, "rb") as stream:
+        shape, fortran, dtype = _header(stream, size)
+        if dtype.hasobject:
+            raise ValueError("it holds Python objects, which are not loaded")
+        count = int(np.prod(shape, dtype=object))
+        if mapped and count and dtype.itemsize:
+            order: Literal["F", "C"] = "F" if fortran else "C"
+            return np.memmap(path, dtype, mode="r", offset=stream.tell(), shape=shape, order=order)
+        return _shaped(np.fromfile(stream, dtype=dtype, count=count), shape, fortran, dtype)
+
+
+def _header(stream: IO[bytes], size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Read the header of an array, and hold it against the bytes that there are."""
+    try:
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
+    except Exception as error:
+        # A damaged header raises whatever Python's own parser does.
+        raise ValueError(f"its header cannot be read: {error}") from error
     if dtype.hasobject:
-        raise ValueError("it holds Python objects, which are not loaded")
-    count = 1
-    for length in shape:
-        count *= length
-    if min(shape, default=0) < 0 or count * dtype.itemsize > size:
+        return shape, fortran, dtype
+    # In Python's own integers, which do not overflow.
+    if min(shape, default=0) < 0 or np.prod(shape, dtype=object) * max(dtype.itemsize, 1) > size - stream.tell():
         raise ValueError(f"its header claims {dtype} of shape {shape}, but the file has {size} bytes")
-    if isinstance(stream, BufferedReader):
-        flat = np.fromfile(stream, dtype=dtype, count=count) if dtype.itemsize else np.empty(count, dtype)
-    else:
-        flat = np.frombuffer(bytearray(stream.read(count * dtype.itemsize)), dtype=dtype)
-    if len(flat) < count:
+    return shape, fortran, dtype
+
+
+def _shaped(flat: Array, shape: tuple[int, ...], fortran: bool, dtype: np.dtype[Any]) -> Array:
+    if len(flat) < np.prod(shape, dtype=object):
         raise ValueError(f"its header claims {dtype} of shape {shape}, but only {len(flat)} values follow")
     return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
 
-def _members(path: Path) -> dict[str, Array]:
-    """Arrays of an archive; what is no array is left out."""
+def _members(path: Path) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Arrays of an archive, and what was left out; what is no array at all is not mentioned."""
     arrays: dict[str, Array] = {}
+    problems: list[str] = []
     with zipfile.ZipFile(path) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())
         if unpacked > _USUAL_RATIO * path.stat().st_size:
@@ -81,7 +102,15 @@ def _members(path: Path) -> dict[str, Array]:
                 continue
             try:
                 with archive.open(entry) as stream:
-                    arrays[entry.filename[:-4]] = _load(stream, entry.file_size)
+                    shape, fortran, dtype = _header(stream, entry.file_size)
+                    if dtype.hasobject:
+                        problems.append(f"member {entry.filename!r} holds Python objects: left out")
+                        continue
+                    count = int(np.prod(shape, dtype=object))
+                    flat = np.zeros(count, dtype)
+                    if dtype.itemsize:
+                        flat = np.frombuffer(bytearray(stream.read(count * dtype.itemsize)), dtype)
+                    arrays[entry.filename[:-4]] = _shaped(flat, shape, fortran, dtype)
             except (NotImplementedError, RuntimeError) as error:
                 raise ValueError(f"member {entry.filename!r}: {error}") from error
             except zipfile.BadZipFile:
@@ -89,7 +118,7 @@ def _members(path: Path) -> dict[str, Array]:
             except Exception as error:
                 # What zlib and NumPy raise on a damaged member; named, because there are others.
                 raise ValueError(f"member {entry.filename!r}: {error}") from error
-    return arrays
+    return arrays, tuple(problems)
 
 
 def check_table(path: Path, loaded: Array) -> None:
@@ -131,7 +160,7 @@ def _from_records(path: Path, loaded: Array) -> CloudFile:
     )
 
 
-def _from_npz(path: Path, arrays: dict[str, Array]) -> CloudFile:
+def _from_npz(path: Path, arrays: dict[str, Array], problems: tuple[str, ...]) -> CloudFile:
     found = [key for key in _POINT_KEYS if key in arrays]
     found = found or [key for key, values in arrays.items() if values.ndim == 2 and values.shape[1:] == (3,)]
     shapes = {key: values.shape for key, values in arrays.items()}
@@ -140,7 +169,7 @@ def _from_npz(path: Path, arrays: dict[str, Array]) -> CloudFile:
     points = arrays[found[0]]
     if points.dtype.names is not None:
         cloud = _from_records(path, points)
-        return CloudFile(cloud.points, cloud.normals, cloud.attributes, ".npz")
+        return CloudFile(cloud.points, cloud.normals, cloud.attributes, ".npz", problems=problems)
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
         raise malformed(path, "NPZ", f"{found[0]!r} is {points.dtype} of shape {points.shape}, expected (n, 3)")
     normals = arrays.get("normals")
@@ -156,6 +185,7 @@ def _from_npz(path: Path, arrays: dict[str, Array]) -> CloudFile:
         normals=normals,
         attributes=attributes,
         suffix=".npz",
+        problems=problems,
         source=(found[0], arrays),
     )
 

@@ -47,9 +47,16 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
     """Write a LAS or LAZ file; see `face_plugin.io.write_cloud`."""
     laspy = require("laspy", extra="las")
     points, normals, attributes = columns(cloud, normals, extra, keep)
+    bad = len(points) - int(np.isfinite(points).all(axis=1).sum())
+    if bad:
+        # LAS stores integers, and what they would become is anything.
+        raise ValueError(
+            f"points: LAS holds finite coordinates only, found NaN or infinity in {bad} of {len(points)} rows"
+        )
     if isinstance(cloud.source, laspy.LasData):
-        # Indexing copies header and points.
-        las = cloud.source[np.ones(len(cloud), dtype=bool) if keep is None else keep]
+        # Indexing copies header and points; an empty mask would be taken for an empty list of names.
+        mask = np.ones(len(cloud), dtype=bool) if keep is None else keep
+        las = cloud.source[mask if len(mask) else slice(0, 0)]
         # The octree of a COPC file names places in that file.
         las.header.vlrs = [vlr for vlr in las.header.vlrs if vlr.user_id != "copc"]
         las.evlrs = [vlr for vlr in las.evlrs or [] if vlr.user_id != "copc"] or None

@@ -74,7 +74,7 @@ def _table(path: Path, lines: list[str], keyword: str) -> Array | None:
             if widths[k] < 3:
                 raise malformed(path, "OBJ", f"line {k + 1}: {lines[k][:60]!r}") from None
         # Lines of different widths (a weight, or a colour, on some of them): the first three numbers count.
-        table = np.array([[float(word) for word in row.split()[:3]] for row in rows])
+        table = np.array([[float(word) for word in row.split("#")[0].split()[:3]] for row in rows])
     return table
 
 

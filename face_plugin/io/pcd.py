@@ -170,7 +170,7 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
         fields["rgb"] = packed.view(np.float32)
     for name, values in attributes.items():
         if values.dtype.kind in "fiub":
-            label = "_".join(name.split())
+            label = "_".join(name.split()) or "unnamed"
             fields[label] = values.astype(np.uint8) if values.dtype.kind == "b" else values
     _write_fields(path, fields, cloud)
 

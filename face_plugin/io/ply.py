@@ -56,7 +56,7 @@ def check(path: Path, cloud: CloudFile) -> None:
             continue
         for name in [n for n in CORNERS if n in names] or (_EDGE if set(_EDGE) <= set(names) else ()):
             column = part.data[name]
-            rows = column if column.dtype.hasobject else column.reshape(len(column), -1)
+            rows = column if column.dtype.hasobject else np.atleast_2d(column.T).T
             for k, row in _astray(rows, len(cloud)):
                 found = f"row {k + 1} of {part.name!r} names vertex {row} of {len(cloud)} (counted from 0)"
                 raise malformed(path, "PLY", found)
@@ -134,6 +134,6 @@ def _kept(old: PlyElement, keep: Array | None) -> PlyElement:
                 data[name][k] = row
         else:
             indices = new[data[name]]
-            rows &= (indices >= 0).reshape(len(indices), -1).all(axis=1)
+            rows &= (indices >= 0).all(axis=tuple(range(1, indices.ndim)))
             data[name] = indices
     return PlyElement(old.name, old.properties, data[rows], old.comments)

@@ -33,7 +33,7 @@ def element(
         if typed is None:
             log.warning("%s is text, which PLY cannot hold: left out", key)
             continue
-        label = "_".join(key.split()).encode("ascii", "replace").decode() or "_"
+        label = "_".join(key.split()).encode("ascii", "replace").decode() or "unnamed"
         used[label] = typed
         if lists and key in lists:
             properties.append(lists[key])

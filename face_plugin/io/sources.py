@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import require
-from face_plugin.io.arrays import check_records, check_table
+from face_plugin.io.arrays import check_records, check_table, load_npy
 from face_plugin.io.cloudfile import malformed
 from face_plugin.io.lascheck import check_las
 
@@ -159,8 +159,8 @@ def open_source(path: Path) -> Source:
 
 def _open_npy(path: Path) -> Source:
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, OverflowError) as error:
+        array = load_npy(path, mapped=True)
+    except ValueError as error:
         raise malformed(path, "NPY", error) from error
     if array.dtype.names is not None:
         return _RecordSource(path, array, check_records(path, array.dtype, array.shape))

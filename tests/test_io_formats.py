@@ -128,3 +128,11 @@ def test_unknown_suffix_lists_what_can_be_read(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"'\.e57'; allowed are \.ply, \.pcd"):
         write_cloud(tmp_path / "a.e57", CloudFile(made.POINTS))
     assert ".stl" not in CLOUD_SUFFIXES
+
+
+def test_places_of_a_grid_without_a_return_are_left_out(tmp_path: Path) -> None:
+    grid = np.repeat(made.POINTS, 2, axis=0)
+    grid[1::2, 2] = np.nan
+    content = made.pcd("ascii", made.lines(made.rows("%.3f %.3f %.3f", grid)).encode())
+    write(tmp_path / "a.pcd", content.replace(b" 40", b" 80"))
+    np.testing.assert_array_equal(read_cloud(tmp_path / "a.pcd").points, made.POINTS)

@@ -67,6 +67,22 @@ def test_every_pair_of_formats(suffix, output, ball, expected, tmp_path):
     assert np.allclose(read_cloud(target).points, read.points[~inside], rtol=0, atol=step)
 
 
+@pytest.mark.parametrize("factor", [1, 257])
+def test_colours_of_las_become_bytes_in_every_part(factor, ball, tmp_path):
+    rng = np.random.default_rng(1)
+    colours = {name: rng.integers(0, 256, COUNT) * (np.arange(COUNT) > 1200) for name in ("red", "green", "blue")}
+    given = {name: (values * factor).astype(np.uint16) for name, values in colours.items()}
+    write_cloud(tmp_path / "in.las", CloudFile(ball.points, attributes=given))
+    opened = open_source(tmp_path / "in.las")
+    # The first part is black: it does not say whether the colours have 8 bits or 16.
+    parts = columns_of(opened, {"normals": ball.normals}, [], drop_interior=False, chunk=1000)
+    WRITERS[".ply"](tmp_path / "out.ply", COUNT, parts, opened)
+    written = read_cloud(tmp_path / "out.ply").attributes
+    for name, values in colours.items():
+        assert written[name].dtype == np.uint8
+        assert np.array_equal(written[name], values)
+
+
 def test_the_same_normals_as_in_memory(ball, expected, tmp_path):
     np.save(tmp_path / "in.npy", ball.points)
     result = normals_of_file(tmp_path / "in.npy", tmp_path / "out.ply", PARAMS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ import numpy as np
 from face_plugin.io.cloudfile import Array, CloudFile, columns, format_column, interleave, malformed
 from face_plugin.io.lzf import decompress
 from face_plugin.io.names import COLOUR, NORMAL, POINT, meanings, with_colours
+
+log = logging.getLogger(__name__)
 
 _NORMAL = tuple(f"normal_{axis}" for axis in POINT)
 _KINDS = {"F": "f", "I": "i", "U": "u"}
@@ -43,6 +46,11 @@ def read(path: Path) -> CloudFile:
     found = meanings(names)
     if any(axis not in found or table[found[axis]].ndim != 1 for axis in POINT):
         raise malformed(path, "PCD", f"no x, y, z, but {names}")
+    # Where a sensor's grid has no return, the coordinates are NaN.
+    empty = np.any([np.isnan(table[found[axis]]) for axis in POINT], axis=0)
+    if empty.any():
+        log.info("%s: %d of %d places without a return are left out", path, empty.sum(), len(table))
+        table = table[~empty]
     has_normals = all(n in found for n in NORMAL)
     used = {found[n] for n in (*POINT, *(NORMAL if has_normals else ()))}
     attributes: dict[str, Array] = {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from face_plugin.errors import require
 from face_plugin.io.las import LAS_NORMAL, colour_16_bit, new_las
-from face_plugin.io.names import NORMAL, POINT
+from face_plugin.io.names import COLOUR, NORMAL, POINT
 from face_plugin.io.plydata import PlyData
 from face_plugin.io.plywrite import binary_rows, element
 from face_plugin.io.sources import LasSource, Source
@@ -46,7 +46,10 @@ def _npy(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
 def _ply(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
     """Write a binary little-endian PLY with one element."""
     with open(path, "wb") as stream:
+        wide = _has_wide_colours(source)
         for k, part in enumerate(parts):
+            if isinstance(source, LasSource) and all(name in part for name in COLOUR):
+                part = {**part, **{name: _byte(part[name], wide) for name in COLOUR}}
             # The type of a wide integer must not hang on the values of one part.
             narrow = {
                 name: values.astype(np.float64) if values.dtype in (np.int64, np.uint64) else values
@@ -56,6 +59,17 @@ def _ply(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
             if k == 0:
                 stream.write(PlyData([vertex]).header_for({"vertex": count}).encode("ascii", "replace"))
             stream.write(binary_rows(vertex, "<").data)
+
+
+def _has_wide_colours(source: Source) -> bool:
+    """Whether the colours of a LAS use their 16 bits; some programs put bytes there. One part cannot tell."""
+    return isinstance(source, LasSource) and any(
+        name in values and values[name].max(initial=0) > 255 for _, values in source.parts() for name in COLOUR
+    )
+
+
+def _byte(values: Array, wide: bool) -> Array:
+    return np.clip(np.rint(values / (257.0 if wide else 1.0)), 0, 255).astype(np.uint8)
 
 
 def _las(path: Path, count: int, parts: Iterator[Columns], source: Source) -> None:
@@ -73,7 +87,7 @@ def _las(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
             records = laspy.ScaleAwarePointRecord.zeros(len(named["x"]), header=header)
             for name, values in named.items():
                 if name in POINT or name in set(header.point_format.dimension_names):
-                    records[name] = colour_16_bit(values) if name in ("red", "green", "blue") else values
+                    records[name] = colour_16_bit(values) if name in COLOUR else values
             writer.write_points(records)
     finally:
         if writer is not None:

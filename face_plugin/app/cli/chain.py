@@ -8,7 +8,15 @@ from typing import Any
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command
-from face_plugin.io import CLOUD_SUFFIXES, MESH_SUFFIXES, check_output, read_cloud, write_cloud, write_mesh
+from face_plugin.io import (
+    CLOUD_SUFFIXES,
+    MESH_SUFFIXES,
+    READ_SUFFIXES,
+    check_output,
+    read_cloud,
+    write_cloud,
+    write_mesh,
+)
 
 __all__ = ["register"]
 
@@ -25,7 +33,7 @@ def register(commands: Any) -> None:
         inputs="chain of steps",
         suffixes=(".toml", ".json"),
     )
-    parser.add_argument("cloud", metavar="CLOUD", type=Path, help=f"point cloud ({', '.join(CLOUD_SUFFIXES)})")
+    parser.add_argument("cloud", metavar="CLOUD", type=Path, help=f"point cloud ({', '.join(READ_SUFFIXES)})")
 
 
 def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str]:

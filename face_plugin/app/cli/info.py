@@ -54,6 +54,7 @@ def describe(cloud: CloudFile) -> dict[str, Any]:
         "diagonal": None if low is None or high is None else float(np.linalg.norm(high - low)),
         "spacing": spacing,
         "normals": cloud.normals is not None,
+        "viewpoints": None if cloud.viewpoints is None else len(cloud.viewpoints),
         "attributes": {name: str(values.dtype) for name, values in cloud.attributes.items()},
     }
 

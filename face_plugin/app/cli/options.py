@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from face_plugin.app.cli.console import Console
 from face_plugin.errors import require
-from face_plugin.io import CLOUD_SUFFIXES
+from face_plugin.io import READ_SUFFIXES
 from face_plugin.params import Params
 
 __all__ = [
@@ -40,7 +40,7 @@ def add_command(
     *,
     output: str | None = None,
     inputs: str = "point cloud",
-    suffixes: tuple[str, ...] = CLOUD_SUFFIXES,
+    suffixes: tuple[str, ...] = READ_SUFFIXES,
 ) -> argparse.ArgumentParser:
     """Add a subcommand with what all of them have: the input, the output, and how much to say.
 

@@ -1,16 +1,17 @@
 """The process in which TetGen and fTetWild run: ``python -m (this module) LIBRARY IN OUT BYTES``.
 
-Arrays come and go as .npz files. Imports no more than NumPy and the library.
+Arrays come and go as .npz files. Imports no more than NumPy, the library and `face_plugin.child`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import sys
 from typing import Any
 
 import numpy as np
+
+from face_plugin.child import limit_memory
 
 Arrays = dict[str, Any]
 
@@ -41,17 +42,6 @@ def tetwild(data: Arrays) -> Arrays:
 
 
 LIBRARIES = {"tetgen": ("tetgen", tetgen), "tetwild": ("pytetwild", tetwild)}
-
-
-def limit_memory(size: int) -> None:
-    """Let allocations beyond `size` bytes fail, where the system can do that."""
-    with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource
-
-        # What the interpreter and its libraries have mapped already does not count against the mesher.
-        with open("/proc/self/statm") as statm:
-            mapped = int(statm.read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (size + mapped, resource.RLIM_INFINITY))
 
 
 def main() -> None:

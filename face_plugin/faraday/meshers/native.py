@@ -6,7 +6,6 @@ C, exhausted memory). A user's session must survive that, so `face_plugin.farada
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.child import environment, failure
 from face_plugin.errors import MeshingError
 
 __all__ = ["run_native"]
@@ -51,25 +51,8 @@ def run_native(
         command = [sys.executable, "-m", "face_plugin.faraday.meshers._native_worker", library]
         command += [str(given), str(made), str(int(memory))]
         # fTetWild writes a file __tracked_surface.stl to where it runs.
-        child = subprocess.run(
-            command, cwd=folder, env=_environment(), capture_output=True, text=True, errors="replace"
-        )
+        child = subprocess.run(command, cwd=folder, env=environment(), capture_output=True, text=True, errors="replace")
         if child.returncode == 0 and made.exists():
             with np.load(made) as archive:
                 return dict(archive)
-    raise MeshingError(f"{library} {_reason(child)}; {advice}")
-
-
-def _environment() -> dict[str, str]:
-    """Copy the caller's environment, with its module path: the child must find the same packages."""
-    path = os.pathsep.join(map(os.path.abspath, sys.path))
-    # Without the safe path a file tetgen.py in the working directory would be imported instead of the
-    # library.
-    return {**os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1"}
-
-
-def _reason(child: subprocess.CompletedProcess[str]) -> str:
-    lines = [line.strip() for line in child.stderr.splitlines() if line.strip()]
-    if child.returncode < 0:
-        return f"crashed (signal {-child.returncode}{': ' + lines[0] if lines else ''})"
-    return f"failed ({lines[-1] if lines else f'exit code {child.returncode}'})"
+    raise MeshingError(f"{library} {failure(child)}; {advice}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import io_files as made
@@ -136,3 +137,39 @@ def test_places_of_a_grid_without_a_return_are_left_out(tmp_path: Path) -> None:
     content = made.pcd("ascii", made.lines(made.rows("%.3f %.3f %.3f", grid)).encode())
     write(tmp_path / "a.pcd", content.replace(b" 40", b" 80"))
     np.testing.assert_array_equal(read_cloud(tmp_path / "a.pcd").points, made.POINTS)
+
+
+@pytest.mark.parametrize("suffix", CLOUD_SUFFIXES)
+@pytest.mark.parametrize("kind", ["f2", ">f4", ">i8", "u2"])
+def test_points_of_every_type_are_written(tmp_path: Path, suffix: str, kind: str) -> None:
+    points = np.asfortranarray(np.arange(12).reshape(4, 3).astype(kind))
+    write_cloud(tmp_path / f"a{suffix}", CloudFile(points))
+    np.testing.assert_allclose(read_cloud(tmp_path / f"a{suffix}").points, points, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_polygons_of_many_lengths(tmp_path: Path, form: str) -> None:
+    """Two lists a row, of lengths that change from row to row: all that was read is written again."""
+    corners = [list(range(k % 4)) for k in range(300)]
+    weights = [[0.5] * (k % 3) for k in range(300)]
+    head = made.ply(
+        form,
+        more="element face 300\nproperty list uchar int vertex_indices\nproperty uchar flag\n"
+        "property list ushort double weights\n",
+    )
+    order = ">" if "big" in form else "<"
+    if form == "ascii":
+        rows = [[len(a), *a, 7, len(b), *b] for a, b in zip(corners, weights, strict=True)]
+        body = made.lines(made.XYZ, [" ".join(map(str, row)) for row in rows]).encode()
+    else:
+        body = made.BIG if order == ">" else made.LITTLE
+        for a, b in zip(corners, weights, strict=True):
+            body += struct.pack(f"{order}B{len(a)}iBH{len(b)}d", len(a), *a, 7, len(b), *b)
+    path = write(tmp_path / "a.ply", head + body)
+    write_cloud(path, read_cloud(path), normals=made.NORMALS)
+    face = read_cloud(path).source["face"].data
+    assert [row.tolist() for row in face["vertex_indices"]] == corners
+    assert [row.tolist() for row in face["weights"]] == weights
+    assert set(face["flag"].tolist()) == {7}
+    write(path, (head + body)[:-9])
+    assert len(read_cloud(path).source["face"].data) == 299

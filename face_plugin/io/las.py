@@ -100,5 +100,5 @@ def new_las(laspy: ModuleType, points: Array) -> Any:
     # 2e9 steps fit 32 bits; a power of ten keeps decimal coordinates readable.
     header.scales = 10.0 ** np.ceil(np.log10(np.maximum(extent, 1e-300) / 2e9))
     las = laspy.LasData(header)
-    las.xyz = points
+    las.x, las.y, las.z = points.T
     return las

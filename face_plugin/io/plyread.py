@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from face_plugin.io.cloudfile import Array
 from face_plugin.io.plydata import PlyData, PlyElement, parse_header
@@ -109,52 +110,73 @@ class _BinaryRows:
         return rows
 
     def _lists(self, element: PlyElement, count: int) -> Array:
-        """Read runs of rows whose lists have the same lengths."""
-        runs: list[Array] = []
-        done, block = 0, count
-        problem = ""
-        while done < count and not problem:
-            lengths = self._lengths(element)
-            if lengths is None:
-                problem = "early end-of-file"
-                break
-            kind = self._counted_type(element, lengths)
-            rows = self._view(kind, min(block, count - done))
-            alike = np.ones(len(rows), dtype=bool)
-            for p, length in zip(element.properties, lengths, strict=True):
-                if p.length is not None:
-                    alike &= rows[f"{p.name} length"] == length
-            fit = len(rows) if alike.all() else int(np.argmin(alike))
-            # Where runs are short, looking far ahead each time would take the square of the time.
-            block = 2 * fit + 16
-            if not fit:
-                problem = "early end-of-file"
-            else:
-                runs.append(rows[:fit][[p.name for p in element.properties]])
-            done += fit
-            self.start += fit * kind.itemsize
-        table = _joined(element, runs, self.order)
-        if problem:
-            raise _RowError(problem, table)
+        """Read rows with lists: at once where all are as long as the first row's, else by their lengths."""
+        names = [p.name for p in element.properties]
+        starts, lengths, end = self._starts(element, min(count, 1))
+        if len(starts):
+            kind = self._counted_type(element, lengths[0].tolist())
+            rows = self._view(kind, count)
+            lists = [(p.name, n) for p, n in zip(element.properties, lengths[0], strict=True) if p.length is not None]
+            if len(rows) == count and all((rows[f"{name} length"] == n).all() for name, n in lists):
+                self.start += kind.itemsize * count
+                return rows[names]
+        starts, lengths, end = self._starts(element, count)
+        table = self._grouped(element, starts, lengths)
+        self.start = end
+        if len(starts) < count:
+            raise _RowError("early end-of-file", table)
         return table
 
-    def _lengths(self, element: PlyElement) -> list[int] | None:
-        """Lengths of the lists of the row that begins here; None where the file ends first."""
-        at, lengths = self.start, []
-        for p in element.properties:
-            length = 0
-            if p.length is not None:
-                kind = np.dtype(self.order + p.length)
-                raw = self.content[at : at + kind.itemsize].tobytes()
-                if len(raw) < kind.itemsize:
-                    return None
-                length = int(np.frombuffer(raw, kind)[0])
-                if not 0 <= length <= len(self.content):
-                    return None
-                at += kind.itemsize
-            lengths.append(length)
-            at += int(p.kind[1:]) * (1 if p.length is None else length)
-        return lengths if at <= len(self.content) else None
+    def _grouped(self, element: PlyElement, starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Array:
+        """Read rows that begin at these bytes, all of one set of lengths at once."""
+        names = [p.name for p in element.properties]
+        same = [len(column) == 0 or bool((column == column[0]).all()) for column in lengths.T]
+        fields: list[Any] = []
+        for p, one, column in zip(element.properties, same, lengths.T, strict=True):
+            if p.length is None:
+                fields.append((p.name, self.order + p.kind))
+            else:
+                fields.append((p.name, self.order + p.kind, (int(column[:1].sum()),)) if one else (p.name, object))
+        table = np.empty(len(starts), dtype=fields)
+        # Mostly one list varies, and one column is sorted much faster than rows are.
+        varying = lengths[:, np.logical_not(same)]
+        key = varying[:, 0] if varying.shape[1] == 1 else np.unique(varying, axis=0, return_inverse=True)[1].ravel()
+        _, first, which = np.unique(key, return_index=True, return_inverse=True)
+        for k, row in enumerate(first):
+            rows = np.flatnonzero(which == k)
+            kind = self._counted_type(element, lengths[row].tolist())
+            part = self.content[starts[rows][:, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
+            for name in names:
+                table[name][rows] = _boxed(part[name]) if table.dtype[name].hasobject else part[name]
+        return table
+
+    def _starts(self, element: PlyElement, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+        """Where each row begins, (r,), the lengths of its lists, (r, properties), and where the rows end."""
+        view, size = self.content.data, len(self.content)
+        order: Literal["little", "big"] = "big" if self.order == ">" else "little"
+        steps = [
+            (int((p.length or "u0")[1:]), int(p.kind[1:]), (p.length or "u")[0] == "i") for p in element.properties
+        ]
+        begun: list[int] = []
+        found: list[list[int]] = []
+        at = self.start
+        while len(begun) < count:
+            row, lengths = at, []
+            for head, item, signed in steps:
+                length = 1
+                if head:
+                    length = int.from_bytes(view[row : row + head], order, signed=signed)
+                    if length < 0 or row + head > size:
+                        length = size
+                row += head + item * length
+                lengths.append(length)
+            if row > size:
+                break
+            begun.append(at)
+            found.append(lengths)
+            at = row
+        columns = np.array(found, dtype=np.int64).reshape(-1, len(steps))
+        return np.array(begun, dtype=np.int64), columns, at
 
     def _counted_type(self, element: PlyElement, lengths: list[int]) -> np.dtype[Any]:
         fields: list[Any] = []
@@ -167,29 +189,12 @@ class _BinaryRows:
         return np.dtype(fields)
 
 
-def _joined(element: PlyElement, runs: list[Array], order: str) -> Array:
-    """One table of runs: 2-d fields where lists have one length throughout, else fields of arrays."""
-    if not runs:
-        return np.empty(0, dtype=_row_type(element, order, [0] * len(element.properties)))
-    if len(runs) == 1:
-        return runs[0]
-    fields: list[Any] = []
-    for p in element.properties:
-        kinds = {run.dtype[p.name] for run in runs}
-        fields.append((p.name, kinds.pop() if len(kinds) == 1 else np.dtype(object)))
-    table = np.empty(sum(map(len, runs)), dtype=fields)
-    for p in element.properties:
-        at = 0
-        for run in runs:
-            part = slice(at, at + len(run))
-            if table.dtype[p.name].hasobject:
-                column = table[p.name]
-                for k, row in enumerate(run[p.name], at):
-                    column[k] = row
-            else:
-                table[p.name][part] = run[p.name]
-            at += len(run)
-    return table
+def _boxed(values: Array) -> Array:
+    """Rows of a table as objects: arrays of arrays of one length must not become a table again."""
+    out = np.empty(len(values), dtype=object)
+    for k, row in enumerate(values):
+        out[k] = row
+    return out
 
 
 class _TextRows:

@@ -115,16 +115,41 @@ def _text_rows(part: PlyElement) -> str:
 
 
 def _write_ragged(stream: BinaryIO, part: PlyElement, text: bool, order: str) -> None:
-    order = "=" if text else order
-    for row in part.data:
-        fields: list[Array] = []
-        for p in part.properties:
-            values = np.atleast_1d(np.asarray(row[p.name])).astype(order + p.kind)
-            if p.length is not None:
-                fields.append(np.array([len(values)], dtype=order + p.length))
-            fields.append(values)
+    """Write rows whose lists have several lengths: all rows of the same lengths at once, each to its place."""
+    lengths = np.stack([_lengths(part, p) for p in part.properties], axis=1)
+    groups, which = np.unique(lengths, axis=0, return_inverse=True)
+    pieces: list[Array] = []
+    lines = np.empty(len(part.data), dtype=object)
+    for k in range(len(groups)):
+        rows = np.flatnonzero(which.ravel() == k)
+        columns = {p.name: _table(part.data[p.name][rows], p) for p in part.properties}
+        data = np.empty(len(rows), dtype=[(name, v.dtype, v.shape[1:]) for name, v in columns.items()])
+        for name, values in columns.items():
+            data[name] = values
+        same = PlyElement(part.name, part.properties, data)
         if text:
-            words = [word for values in fields for word in format_column(values)]
-            stream.write((" ".join(words) + "\n").encode("ascii"))
+            lines[rows] = _text_rows(same).splitlines()
         else:
-            stream.write(b"".join(values.tobytes() for values in fields))
+            pieces.append(binary_rows(same, order).reshape(len(rows), -1))
+    if text:
+        stream.write("".join(line + "\n" for line in lines).encode("ascii"))
+        return
+    sizes = np.array([piece.shape[1] for piece in pieces], dtype=np.int64)[which.ravel()]
+    starts = np.cumsum(sizes) - sizes
+    out = np.empty(int(sizes.sum()), dtype=np.uint8)
+    for k, piece in enumerate(pieces):
+        out[starts[which.ravel() == k][:, None] + np.arange(piece.shape[1])] = piece
+    stream.write(out.data)
+
+
+def _lengths(part: PlyElement, p: PlyProperty) -> Array:
+    column = part.data[p.name]
+    if p.length is None or not column.dtype.hasobject:
+        return np.full(len(column), column.shape[1] if column.ndim == 2 else 0)
+    return np.fromiter(map(len, column), np.int64, len(column))
+
+
+def _table(column: Array, p: PlyProperty) -> Array:
+    """Rows of one length as a table of the property's type."""
+    values = np.array(column.tolist()) if column.dtype.hasobject else column
+    return values.reshape(len(column), -1).astype(p.kind) if p.length is not None else values.astype(p.kind)

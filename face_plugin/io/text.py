@@ -38,11 +38,13 @@ def read(path: Path) -> CloudFile:
 def _parse(path: Path, sheet: Sheet) -> list[Array]:
     """Parse the data lines into one array a column: integers, floats, or text."""
     layout, width, data = sheet.layout, sheet.width, sheet.lines
-    if not layout.comma and '"' not in data[0]:
+    plain = '"' not in data[0] and not (layout.comma and layout.delimiter == ",")
+    if plain:
         try:
-            table = np.loadtxt(data, dtype=np.float64, delimiter=layout.delimiter, ndmin=2, comments=None)
+            points = [line.replace(",", ".") for line in data] if layout.comma else data
+            table = np.loadtxt(points, dtype=np.float64, delimiter=layout.delimiter, ndmin=2, comments=None)
             first = split(data[0], layout)
-            return [_narrow(table[:, c], first[c], data, layout.delimiter, c) for c in range(width)]
+            return [_narrow(table[:, c], first[c], points, layout.delimiter, c) for c in range(width)]
         except ValueError:
             pass
     words = []

@@ -92,7 +92,8 @@ class FaCE(Sculptable):
     Attributes
     ----------
     cloud : Cloud
-        The distinct points in the canonical frame; `frame` is the way between it and the input.
+        The distinct points in the canonical frame, in which `balls`, `mesh` and `poisson` are as well; `frame` is the
+        way between it and the input. What methods take and return is in the coordinates of the input.
     balls : Balls
     mesh : CageMesh
     poisson : Poisson

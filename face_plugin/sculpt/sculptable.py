@@ -150,7 +150,7 @@ class Sculptable(ABC):
         with _naming(f"{source}cage_points: "):
             if sculpt.cage_points:
                 places, reaches = zip(*((p.position, p.radius) for p in sculpt.cage_points), strict=True)
-                twin.add_cage_points(places, reaches)  # type: ignore[arg-type]  # None is a radius too
+                twin.add_cage_points(places, reaches)  # None is a radius too
         with _naming(f"{source}charges: "):
             if sculpt.charges:
                 twin.add_charges(sculpt.charges)

@@ -15,12 +15,13 @@ __all__ = ["COMMENT", "Layout", "Sheet", "decoded", "is_number", "open_sheet", "
 
 log = logging.getLogger(__name__)
 
-COMMENT = ("#", "//", ";;", "%", "!")
+COMMENT = ("#", "//", ";;", "%", "!", "/*")
 _DELIMITERS = (";", "\t", "|", ",")
 # Lines to look for the first coordinates in: no preamble of a text file is as long.
 _PREAMBLE = 10_000
 # Rows in which a decimal comma is looked for: whole numbers have none.
 _PROBE = 1000
+_DIGIT, _WORD = re.compile(r"\d"), re.compile(r"\w+")
 _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
@@ -104,7 +105,8 @@ def open_sheet(path: Path) -> Sheet:
     ValueError
         It is not text, or has no line with coordinates, or as many names as columns.
     """
-    lines = decoded(path, "text").splitlines()
+    # Old systems end a text with a sign of its own.
+    lines = decoded(path, "text").rstrip("\x1a").splitlines()
     first, layout = _first_row(path, lines)
     words = _words(lines[first], layout)
     # A delimiter may end each row, or the last value of the first row be missing: the names decide.
@@ -112,6 +114,10 @@ def open_sheet(path: Path) -> Sheet:
     counted = any(line.strip().isdigit() for line in lines[:first][-1:])
     head, names, header, quoted = _header(path, lines[: first - counted], layout, widths)
     rows, numbers = _rows(lines, first, counted)
+    if header is not None and any(meanings(_WORD.findall(row)) for row in rows if not _DIGIT.search(row)):
+        # Files that were put together repeat their names.
+        kept = [k for k, row in enumerate(rows) if _DIGIT.search(row)]
+        rows, numbers = [rows[k] for k in kept], [numbers[k] for k in kept]
     comma = layout.comma or (layout.delimiter != "," and any(map(_has_decimal_comma, rows[:_PROBE])))
     layout = Layout(layout.delimiter, head, names, header, counted, quoted, comma)
     if comma:
@@ -129,7 +135,7 @@ def _has_decimal_comma(line: str) -> bool:
 def _rows(lines: list[str], first: int, counted: bool) -> tuple[list[str], list[int] | range]:
     """Lines of data from the first on, without blank lines, comments and counts of further scans."""
     data = lines[first:]
-    plain = all(sign not in line for line in data for sign in ("#", "//", ";;", "%", "!")) and not counted
+    plain = all(sign not in line for line in data for sign in COMMENT) and not counted
     if plain and all(map(str.strip, data)):
         return data, range(first + 1, len(lines) + 1)
     rows, numbers = [], []
@@ -198,7 +204,7 @@ def _header(
     filled = [k for k, line in enumerate(lines) if line.strip()]
     # The last line, if it is no comment, else any comment: nearest to the data first.
     for k in reversed(filled):
-        sign = re.match(r"\s*(#+|//+|;;|%+|!+)\s*", lines[k])
+        sign = re.match(r"\s*(#+|//+|;;|%+|!+|/\*+)\s*", lines[k])
         text = lines[k][sign.end() :] if sign else lines[k]
         names = _names(text, layout, widths)
         found = meanings(names)
@@ -208,7 +214,8 @@ def _header(
         if len(names) in widths and names and (complete or titled or known >= 2 or is_time(names[0])):
             head = tuple(line for row, line in enumerate(lines) if row != k and (row < k or line.strip()))
             return head, tuple(names), sign.group(0) if sign else "", '"' in text
-        if not sign and known >= 2:
+        timed = complete and any(map(is_time, _WORD.findall(text)))
+        if len(names) not in widths and ((not sign and known >= 2) or (sign and timed)):
             found_names = f"{len(names)} column names for {widths[0]} columns: {names}"
             raise malformed(path, "text", f"line {k + 1}: {found_names}")
         if not sign:
@@ -230,4 +237,6 @@ def _names(text: str, layout: Layout, widths: tuple[int, int]) -> list[str]:
         if len(names) in widths:
             return names
         best = best or names
-    return best
+    # Names of several words stand apart by more than one blank.
+    apart = re.split(r"\s{2,}|\t", text.strip())
+    return apart if len(apart) in widths and not any(map(is_number, apart)) else best

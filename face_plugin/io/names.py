@@ -87,11 +87,16 @@ def meanings(names: Iterable[str]) -> dict[str, str]:
     {'x': 'Easting [m]', 'y': 'northing', 'z': 'HEIGHT', 'red': 'R'}
     """
     found: dict[str, str] = {}
+    names = list(names)
     for name in names:
         spelled = _spelled(name)
         meaning = _SPELLINGS.get(spelled)
         if meaning and (meaning not in found or (spelled in _PLAIN and _spelled(found[meaning]) not in _PLAIN)):
             found[meaning] = name
+    survey = {_spelled(name): name for name in names}
+    if not any(axis in found for axis in POINT[:2]) and {"e", "n"} <= set(survey):
+        # Single letters mean little, unless they stand together.
+        found.update({axis: survey[letter] for axis, letter in zip(POINT, "enh", strict=True) if letter in survey})
     return found
 
 
@@ -108,8 +113,12 @@ def is_time(name: str) -> bool:
 def guess_names(table: list[Array], *, suffix: str = "") -> list[str]:
     """Name columns that have no names: x, y, z, then normals (unit length) and colours (bytes), then numbers.
 
-    ``.pts`` files have an intensity before the colours, ``.xyzrgb`` files colours of 0 to 1.
+    Text before the first number is a label of the point. ``.pts`` files have an intensity before the colours,
+    ``.xyzrgb`` files colours of 0 to 1.
     """
+    labels = next((k for k, column in enumerate(table) if column.dtype.kind != "U"), 0)
+    if labels:
+        return [f"label_{k + 1}" for k in range(labels)] + guess_names(table[labels:], suffix=suffix)
     names = [*POINT]
     if _are_normals(table[3:6]):
         names += NORMAL

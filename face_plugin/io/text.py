@@ -123,7 +123,9 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
         if layout.counted:
             stream.write(f"{len(points)}\n")
         if layout.header is not None:
-            names = [f'"{name}"' for name in values] if layout.quoted else values
+            # Where blanks part the columns, names have none.
+            names = list(values) if layout.delimiter else ["_".join(name.split()) for name in values]
+            names = [f'"{name}"' for name in names] if layout.quoted else names
             stream.write(layout.header + separator.join(names) + "\n")
         stream.write(interleave([_cells(column, layout) for column in values.values()], separator))
 

@@ -128,6 +128,12 @@ def test_damaged_laz_does_not_end_the_process(tmp_path: Path) -> None:
     assert "not a readable LAZ file" in child.stdout
 
 
+def test_rows_of_too_many_words_are_not_read_as_others(tmp_path: Path) -> None:
+    (tmp_path / "a.ply").write_bytes(made.ply("ascii") + made.lines([row + " 7" for row in made.XYZ]).encode())
+    with pytest.raises(ValueError, match=r"row 1 is malformed"):
+        read_cloud(tmp_path / "a.ply")
+
+
 def test_faces_that_name_absent_vertices(tmp_path: Path) -> None:
     vertices = made.lines(["v " + row for row in made.XYZ])
     for last, found in (

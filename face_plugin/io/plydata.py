@@ -119,7 +119,7 @@ def parse_header(content: bytes) -> tuple[PlyData, list[int], int]:
     lines, end = _header_lines(content)
     data, counts, form = PlyData([]), [], False
     for number, line in enumerate(lines[1:], 2):
-        keyword, _, rest = line.strip().partition(" ")
+        keyword, rest = (*line.strip().split(None, 1), "", "")[:2]
         words = rest.split()
         try:
             if keyword == "format":
@@ -140,7 +140,14 @@ def parse_header(content: bytes) -> tuple[PlyData, list[int], int]:
             elif keyword:
                 raise ValueError
         except (ValueError, KeyError, IndexError):
-            raise ValueError(f"line {number} of the header: {line[:60]!r}") from None
+            fault = f"line {number} of the header: {line[:60]!r}"
+            before = [e.name for e in (data.elements if keyword == "element" else data.elements[:-1])]
+            if keyword not in ("element", "property") or "vertex" not in before:
+                raise ValueError(fault) from None
+            # What stands behind the vertices need not be understood to read them.
+            data.problems.append(f"{fault}: elements from there on are left out")
+            del data.elements[len(before) :], counts[len(before) :]
+            break
     if not form:
         raise ValueError("no line 'format' in the header")
     for element in data.elements:

@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 
 from face_plugin.io.cloudfile import Array
 from face_plugin.io.plydata import PlyData, PlyElement, parse_header
+from face_plugin.io.plytext import RowError, TextRows, row_type
 
 __all__ = ["read_data"]
-
-
-class _RowError(Exception):
-    """A row that cannot be read; the rows before it are kept in `rows`."""
-
-    def __init__(self, reason: str, rows: Array) -> None:
-        super().__init__(reason)
-        self.rows = rows
 
 
 def read_data(path: Path, *, mapped: bool = False) -> PlyData:
@@ -45,16 +38,18 @@ def read_data(path: Path, *, mapped: bool = False) -> PlyData:
         raise ValueError("the file is empty: early end-of-file")
     content = np.memmap(path, np.uint8, mode="r") if mapped else np.fromfile(path, np.uint8)
     data, counts, start = parse_header(bytes(content[: _header_size(content)]))
-    rows = _TextRows(content, start) if data.text else _BinaryRows(content, start, data.byte_order)
+    rows = TextRows(content, start) if data.text else _BinaryRows(content, start, data.byte_order)
+    broken = False
     for element, count in zip(data.elements, counts, strict=True):
-        if data.problems:
-            element.data = np.empty(0, dtype=_row_type(element, "=", [0] * len(element.properties)))
+        if broken:
+            element.data = np.empty(0, dtype=row_type(element, "=", [0] * len(element.properties)))
             if count:
                 data.problems.append(f"the {count} rows of {element.name!r} behind that are left out")
             continue
         try:
             element.data = rows.read(element, count)
-        except _RowError as error:
+        except RowError as error:
+            broken = True
             element.data = error.rows
             found = len(error.rows)
             if element.name == "vertex" or "vertex" not in [
@@ -76,15 +71,6 @@ def _header_size(content: Array) -> int:
     return min(2 * size, len(content))
 
 
-def _row_type(element: PlyElement, order: str, lengths: list[int]) -> np.dtype[Any]:
-    """Type of a row whose lists are so long, without their counts."""
-    fields: list[Any] = []
-    for p, length in zip(element.properties, lengths, strict=True):
-        kind = order + p.kind
-        fields.append((p.name, kind) if p.length is None else (p.name, kind, (length,)))
-    return np.dtype(fields)
-
-
 class _BinaryRows:
     """Rows of binary files, element by element."""
 
@@ -93,13 +79,13 @@ class _BinaryRows:
 
     def read(self, element: PlyElement, count: int) -> Array:
         if all(p.length is None for p in element.properties):
-            kind = _row_type(element, self.order, [0] * len(element.properties))
+            kind = row_type(element, self.order, [0] * len(element.properties))
             if not kind.itemsize:
                 return np.empty(count, dtype=kind)
             rows = self._view(kind, count)
             self.start += len(rows) * kind.itemsize
             if len(rows) < count:
-                raise _RowError("early end-of-file", rows)
+                raise RowError("early end-of-file", rows)
             return rows
         return self._lists(element, count)
 
@@ -124,7 +110,7 @@ class _BinaryRows:
         table = self._grouped(element, starts, lengths)
         self.start = end
         if len(starts) < count:
-            raise _RowError("early end-of-file", table)
+            raise RowError("early end-of-file", table)
         return table
 
     def _grouped(self, element: PlyElement, starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Array:
@@ -195,94 +181,3 @@ def _boxed(values: Array) -> Array:
     for k, row in enumerate(values):
         out[k] = row
     return out
-
-
-class _TextRows:
-    """Rows of ascii files: one a line, blank lines left out."""
-
-    def __init__(self, content: Array, start: int) -> None:
-        self.lines = [line for line in bytes(content[start:]).splitlines() if line.strip()]
-        self.next = 0
-
-    def read(self, element: PlyElement, count: int) -> Array:
-        if not element.properties:
-            return np.empty(count, dtype=[])
-        lines = self.lines[self.next : self.next + count]
-        self.next += len(lines)
-        try:
-            table = self._table(element, lines)
-        except ValueError:
-            table = self._by_words(element, lines, count)
-        if len(table) < count:
-            raise _RowError("early end-of-file", table)
-        return table
-
-    def _table(self, element: PlyElement, lines: list[bytes]) -> Array:
-        """Parse lines of one width in one go."""
-        lengths, at = [], 0
-        first = lines[0].split() if lines else []
-        for p in element.properties:
-            lengths.append(0 if p.length is None or not lines else int(first[at]) if at < len(first) else -1)
-            at += 1 if p.length is None else 1 + lengths[-1]
-            if lengths[-1] < 0 or (at > max(len(first), 1) and lines):
-                raise ValueError
-        table = np.empty(len(lines), dtype=_row_type(element, "=", lengths))
-        if not lines:
-            return table
-        if at != len(first):
-            raise ValueError
-        numbers = np.loadtxt(lines, dtype=np.float64, ndmin=2, comments=None)
-        if numbers.shape != (len(lines), at):
-            raise ValueError
-        column = 0
-        for p, length in zip(element.properties, lengths, strict=True):
-            if p.length is None:
-                table[p.name] = _typed(numbers[:, column], p.kind)
-                column += 1
-            else:
-                if (numbers[:, column] != length).any():
-                    raise ValueError
-                table[p.name] = _typed(numbers[:, column + 1 : column + 1 + length], p.kind)
-                column += 1 + length
-        return table
-
-    def _by_words(self, element: PlyElement, lines: list[bytes], count: int) -> Array:
-        """Parse line by line, to the first that does not fit."""
-        table = np.empty(
-            len(lines), dtype=[(p.name, p.kind if p.length is None else object) for p in element.properties]
-        )
-        for k, line in enumerate(lines):
-            words = line.split()
-            at = 0
-            try:
-                for p in element.properties:
-                    size = 1
-                    if p.length is not None:
-                        size = int(words[at])
-                        at += 1
-                    if size < 0 or len(words) < at + size:
-                        raise IndexError
-                    values = _typed(np.array([float(word) for word in words[at : at + size]]), p.kind)
-                    table[p.name][k] = values[0] if p.length is None else values
-                    at += size
-                if at < len(words):
-                    raise ValueError
-            except (ValueError, IndexError) as error:
-                last = k == len(lines) - 1 and self.next >= len(self.lines) and isinstance(error, IndexError)
-                shown = line[:60].decode("latin-1")
-                reason = "early end-of-line" if last else f"row {k + 1} is malformed ({shown!r})"
-                raise _RowError(reason, table[:k]) from None
-        return table
-
-
-def _typed(values: Array, kind: str) -> Array:
-    """Cast numbers that were read as float64; ValueError where the type cannot hold them."""
-    target = np.dtype(kind)
-    if target.kind == "f":
-        return values.astype(target)
-    limits = np.iinfo(target)
-    with np.errstate(invalid="ignore"):
-        whole = (values >= limits.min) & (values <= limits.max)
-    if not whole.all():
-        raise ValueError(f"{values[~whole].flat[0]} does not fit into {target}")
-    return values.astype(target)

@@ -7,10 +7,11 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from face_plugin.compiled import compiled
 
 __all__ = ["in_threads", "local_spacing", "log_ramp", "plane_fit", "ramp", "thin", "unit"]
 
@@ -148,7 +149,7 @@ def thin(points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
     return np.flatnonzero(_greedy(order, start, neighbour))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _greedy(order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]) -> NDArray[np.bool_]:
     taken = np.zeros(len(order), dtype=np.bool_)
     for i in order:

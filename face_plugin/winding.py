@@ -10,10 +10,10 @@ It is 1 inside, 0 outside, and its gradient at the surface is the inward normal.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.compiled import compiled
 from face_plugin.geometry import in_threads
 
 __all__ = ["DipoleTree"]
@@ -128,7 +128,7 @@ class DipoleTree:
         return out
 
 
-@numba.njit(cache=True)
+@compiled()
 def _build(points, areas, leaf):  # type: ignore[no-untyped-def]
     """Halve ranges of the order until they hold at most `leaf` points; children follow their parents."""
     most = 4 * (len(points) // leaf + 2)
@@ -157,7 +157,7 @@ def _build(points, areas, leaf):  # type: ignore[no-untyped-def]
     return start[:count], stop[:count], child[:count], centre, radius
 
 
-@numba.njit(cache=True)
+@compiled()
 def _moments(dipoles, start, stop):  # type: ignore[no-untyped-def]
     sums = np.zeros((len(start), 3))
     for node in range(len(start)):
@@ -167,7 +167,7 @@ def _moments(dipoles, start, stop):  # type: ignore[no-untyped-def]
     return sums
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@compiled(nogil=True, fastmath=True, error_model="numpy")
 def _add(count, source, queries, eps, first, last, out):  # type: ignore[no-untyped-def]
     """Add what sources cause at the queries of a group; columns of positions and dipoles, so that it vectorises.
 
@@ -197,7 +197,7 @@ def _add(count, source, queries, eps, first, last, out):  # type: ignore[no-unty
         out[i, 3] += w
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@compiled(nogil=True, fastmath=True, error_model="numpy")
 def _dipole_sums(  # type: ignore[no-untyped-def]
     first, last, queries, themselves, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
 ):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.compiled import compiled
 from face_plugin.geometry import in_threads, ramp
 
 __all__ = ["choose_quadric", "quadric_fits"]
@@ -102,7 +102,7 @@ def choose_quadric(
     return fitted[chosen, np.arange(len(points))], scatter, typical[0]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _quadrics(first, last, points, normals, neighbour, spacing, counts, fitted, residual):  # type: ignore[no-untyped-def]
     most = neighbour.shape[1]
     local = np.empty((most, 3))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.compiled import compiled
 from face_plugin.faraday.meshers import CageMesh
 
 __all__ = ["half_icosahedron", "strength", "strength_exact", "strength_of_directions", "vertex_gradients"]
@@ -35,7 +35,7 @@ def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(_vertex_gradients(mesh.vertices, mesh.tets, np.ascontiguousarray(values)))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _vertex_gradients(vertices, tets, values):  # type: ignore[no-untyped-def]
     scenarios = values.shape[1]
     out = np.zeros((len(vertices), 3, scenarios))
@@ -93,7 +93,7 @@ def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(_strength_exact(np.ascontiguousarray(gradients)))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _strength_exact(gradients):  # type: ignore[no-untyped-def]
     """Largest eigenvalue of G^T G from the trigonometric solution of its characteristic cubic."""
     out = np.empty(len(gradients))

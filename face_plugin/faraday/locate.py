@@ -6,11 +6,11 @@ tetrahedron cannot run into one; inside a ball the value is the mean over its ca
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from face_plugin.compiled import compiled
 from face_plugin.faraday.gradient import ball_means
 from face_plugin.faraday.isosurface import fill_balls
 from face_plugin.faraday.meshers import CageMesh
@@ -120,7 +120,7 @@ class Locator:
         return np.asarray(out.reshape(len(points), *values.shape[1:]))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _incidence(tets, count):  # type: ignore[no-untyped-def]
     """Tetrahedra of each vertex v: `incident[start[v]:start[v + 1]]`."""
     start = np.zeros(count + 1, dtype=np.int64)
@@ -139,7 +139,7 @@ def _incidence(tets, count):  # type: ignore[no-untyped-def]
     return start, incident
 
 
-@numba.njit(cache=True)
+@compiled()
 def _coordinates(p, vertices, tet, out):  # type: ignore[no-untyped-def]
     """Fill out (4,) with the barycentric coordinates of p; return the index of the smallest."""
     a = vertices[tet[0]]
@@ -152,12 +152,12 @@ def _coordinates(p, vertices, tet, out):  # type: ignore[no-untyped-def]
     return np.argmin(out)
 
 
-@numba.njit(cache=True)
+@compiled()
 def _det(a, b, c):  # type: ignore[no-untyped-def]
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
-@numba.njit(cache=True)
+@compiled()
 def _walk(points, vertices, tets, nearest, start, incident):  # type: ignore[no-untyped-def]
     """Visibility walk from a vertex to each position; -1 where it gets nowhere."""
     found = np.full(len(points), -1, dtype=np.int64)
@@ -187,7 +187,7 @@ def _walk(points, vertices, tets, nearest, start, incident):  # type: ignore[no-
     return found, weights
 
 
-@numba.njit(cache=True)
+@compiled()
 def _neighbour(tets, tet, opposite, start, incident):  # type: ignore[no-untyped-def]
     """Tetrahedron across the facet opposite to a local vertex, or -1."""
     a = tets[tet, (opposite + 1) & 3]
@@ -205,7 +205,7 @@ def _neighbour(tets, tet, opposite, start, incident):  # type: ignore[no-untyped
     return -1
 
 
-@numba.njit(cache=True)
+@compiled()
 def _least_outside(points, vertices, tets):  # type: ignore[no-untyped-def]
     """Tetrahedron in which a position's smallest barycentric coordinate is greatest, by looking at all."""
     found = np.empty(len(points), dtype=np.int64)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from face_plugin.compiled import compiled
 
 __all__ = ["boundary_candidates", "march", "number_edges"]
 
 
-@numba.njit(cache=True)
+@compiled()
 def march(cells, above, table):  # type: ignore[no-untyped-def]
     """Look up the triangles that each cell holds, as (q, 3, 2) pairs of vertices, the smaller first.
 
@@ -36,7 +37,7 @@ def march(cells, above, table):  # type: ignore[no-untyped-def]
     return ends
 
 
-@numba.njit(cache=True)
+@compiled()
 def number_edges(ends, vertices):  # type: ignore[no-untyped-def]
     """Give the distinct rows of (r, 2) numbers in the order of their first occurrence.
 
@@ -63,7 +64,7 @@ def number_edges(ends, vertices):  # type: ignore[no-untyped-def]
     return number, distinct[:count].copy()
 
 
-@numba.njit(cache=True)
+@compiled()
 def boundary_candidates(tets, above, faces, salt):  # type: ignore[no-untyped-def]
     """Select the faces, not wholly above, that may be in one tetrahedron only: all that are, and few others.
 

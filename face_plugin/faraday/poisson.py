@@ -17,12 +17,12 @@ import logging
 from collections.abc import Callable
 from typing import Any, Literal
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from threadpoolctl import ThreadpoolController
 
+from face_plugin.compiled import compiled
 from face_plugin.faraday.meshers import CageMesh
 
 __all__ = ["Poisson", "stiffness"]
@@ -146,7 +146,7 @@ def stiffness(vertices: NDArray[np.float64], tets: NDArray[np.int32], column: ND
     return sparse.csr_matrix((value, index, start), shape=(free, free + box + 1))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _local(vertices, tet, s):  # type: ignore[no-untyped-def]
     """Fill s (4, 4) with the local stiffness matrix of a tetrahedron.
 
@@ -169,7 +169,7 @@ def _local(vertices, tet, s):  # type: ignore[no-untyped-def]
             s[j, i] = s[i, j]
 
 
-@numba.njit(cache=True)
+@compiled()
 def _assemble(vertices, tets, flat, free):  # type: ignore[no-untyped-def]
     """CSR rows of the free vertices: entries are dropped into their rows, then merged along each."""
     start = np.zeros(free + 1, dtype=np.int64)

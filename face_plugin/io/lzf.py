@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from face_plugin.compiled import compiled
 
 __all__ = ["decompress"]
 
@@ -28,7 +29,7 @@ def decompress(packed: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     return out
 
 
-@numba.njit(cache=True)
+@compiled()
 def _unpack(packed: NDArray[np.uint8], out: NDArray[np.uint8]) -> int:  # pragma: no cover
     """Fill `out`; the number of bytes made, or -1 where the input is damaged."""
     at = made = 0

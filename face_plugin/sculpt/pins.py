@@ -30,10 +30,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.compiled import compiled
 from face_plugin.errors import FaceError
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.poisson import Poisson, cage_to_box, factorise
@@ -199,10 +199,10 @@ def rim(mesh: CageMesh, joined: NDArray[np.intp]) -> NDArray[np.intp]:
     """
     inside = np.zeros(len(mesh.owner), dtype=np.bool_)
     inside[joined] = True
-    return joined[_exposed(mesh.tets, inside, inside | (mesh.owner >= 0))[joined]]
+    return np.asarray(joined[_exposed(mesh.tets, inside, inside | (mesh.owner >= 0))[joined]])
 
 
-@numba.njit(cache=True)
+@compiled()
 def _exposed(tets: NDArray[np.int32], inside: NDArray[np.bool_], conducting: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether a vertex (m,) shares a tetrahedron of one of `inside` with one that does not conduct."""
     out = np.zeros(len(inside), dtype=np.bool_)

@@ -67,6 +67,9 @@ class Console:
         for logger in self._loggers:
             logger.addHandler(self._handler)
             logger.setLevel(level)
+        # That code is being compiled is worth a line: nothing else happens for seconds.
+        self._compiling = logging.getLogger("face_plugin.compiled")
+        self._compiling.setLevel(logging.ERROR if self.quiet else logging.INFO)
         logging.captureWarnings(True)
         return self
 
@@ -79,6 +82,7 @@ class Console:
         for logger, level in zip(self._loggers, self._levels, strict=True):
             logger.removeHandler(self._handler)
             logger.setLevel(level)
+        self._compiling.setLevel(logging.NOTSET)
 
     def progress(self, stage: str, fraction: float) -> None:
         """Show a stage: the callback that the library takes."""

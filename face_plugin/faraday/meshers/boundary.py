@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from face_plugin.compiled import compiled
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box
 
@@ -67,7 +67,7 @@ def oriented(vertices: NDArray[np.float64], tets: NDArray[np.int32], flat: float
     return np.asarray(tets[_heights(vertices, tets, volume) > flat])
 
 
-@numba.njit(cache=True)
+@compiled()
 def _cross(vertices, i, j, k):  # type: ignore[no-untyped-def]
     """Return the normal of a triangle, as long as twice its area."""
     ax, ay, az = (
@@ -79,7 +79,7 @@ def _cross(vertices, i, j, k):  # type: ignore[no-untyped-def]
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@numba.njit(cache=True)
+@compiled()
 def _volumes(vertices, tets):  # type: ignore[no-untyped-def]
     out = np.empty(len(tets))
     for t in range(len(tets)):
@@ -92,7 +92,7 @@ def _volumes(vertices, tets):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit(cache=True)
+@compiled()
 def _nearest_first(vertices, tets):  # type: ignore[no-untyped-def]
     for t in range(len(tets)):
         best, shortest = 0, np.inf
@@ -106,7 +106,7 @@ def _nearest_first(vertices, tets):  # type: ignore[no-untyped-def]
         tets[t, 0], tets[t, best] = tets[t, best], tets[t, 0]
 
 
-@numba.njit(cache=True)
+@compiled()
 def _heights(vertices, tets, volume):  # type: ignore[no-untyped-def]
     """Least height of each tetrahedron: three volumes over its largest facet."""
     out = np.zeros(len(tets))

@@ -146,17 +146,19 @@ def thin(points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
     start[crowded + 1] = length
     np.cumsum(start, out=start)
     neighbour = np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])
-    return np.flatnonzero(_greedy(order, start, neighbour))
+    taken[:] = False
+    _greedy(order, start, neighbour, taken)
+    return np.flatnonzero(taken)
 
 
 @compiled()
-def _greedy(order: NDArray[np.intp], start: NDArray[np.int64], neighbour: NDArray[np.int64]) -> NDArray[np.bool_]:
-    taken = np.zeros(len(order), dtype=np.bool_)
-    for i in order:
+def _greedy(order, start, neighbour, taken):  # type: ignore[no-untyped-def]
+    """Take points in their order, each unless one of its neighbours was taken."""
+    for k in range(len(order)):
+        i = order[k]
         free = True
-        for k in range(start[i], start[i + 1]):
-            if taken[neighbour[k]]:
+        for j in range(start[i], start[i + 1]):
+            if taken[neighbour[j]]:
                 free = False
                 break
         taken[i] = free
-    return taken

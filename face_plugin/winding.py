@@ -10,6 +10,8 @@ It is 1 inside, 0 outside, and its gradient at the surface is the inward normal.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +50,10 @@ class DipoleTree:
     def __init__(self, points: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
         self.points = np.ascontiguousarray(points)
         self.areas = np.ascontiguousarray(areas)
-        self._start, self._stop, self._child, self._centre, self._radius = _build(self.points, self.areas, LEAF)
+        most = 4 * (len(points) // LEAF + 2)
+        nodes = [*np.empty((3, most), dtype=np.int64), np.empty((most, 3)), np.empty(most)]
+        count = _build(self.points, self.areas, LEAF, *nodes)
+        self._start, self._stop, self._child, self._centre, self._radius = (of[:count] for of in nodes)
 
     def outward(
         self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
@@ -113,7 +118,8 @@ class DipoleTree:
     ) -> NDArray[np.float64]:
         """Columns of -4 pi grad w, and 4 pi w."""
         dipoles = np.ascontiguousarray(normals * self.areas[:, None])
-        moments = _moments(dipoles, self._start, self._stop)
+        moments = np.zeros((len(self._start), 3))
+        _moments(dipoles, self._start, self._stop, moments)
         themselves = positions is None
         queries = self.points if positions is None else np.ascontiguousarray(positions)
         out = np.zeros((len(queries), 4))
@@ -121,96 +127,76 @@ class DipoleTree:
         def run(groups: slice) -> None:
             _dipole_sums(
                 groups.start, groups.stop, queries, themselves, self.points, dipoles, eps, self._start, self._stop,
-                self._child, self._centre, self._radius, moments, opening, out,
+                self._child, self._centre, self._radius, moments, opening, np.empty(STACK, dtype=np.int64),
+                np.empty((6, LIST)), out,
             )  # fmt: skip
 
         in_threads(run, -(-len(queries) // GROUP), 512 // GROUP)
         return out
 
 
-@compiled()
-def _build(points, areas, leaf):  # type: ignore[no-untyped-def]
-    """Halve ranges of the order until they hold at most `leaf` points; children follow their parents."""
-    most = 4 * (len(points) // leaf + 2)
-    start, stop = np.zeros(most, np.int64), np.zeros(most, np.int64)
-    child = np.full(most, -1, np.int64)
+@compiled(error_model="numpy")
+def _build(points, areas, leaf, start, stop, child, centre, radius):  # type: ignore[no-untyped-def]
+    """Halve ranges of the order until they hold at most `leaf` points; return how many there are.
+
+    Children follow their parents; `child` (-1: none) is the first of two.
+    """
     count, node = 1, 0
-    stop[0] = len(points)
+    start[0], stop[0] = 0, len(points)
     while node < count:
-        if stop[node] - start[node] > leaf:
-            middle = (start[node] + stop[node]) // 2
+        first, last = start[node], stop[node]
+        child[node] = -1
+        if last - first > leaf:
+            middle = (first + last) // 2
             child[node] = count
-            start[count], stop[count] = start[node], middle
-            start[count + 1], stop[count + 1] = middle, stop[node]
+            start[count], stop[count] = first, middle
+            start[count + 1], stop[count + 1] = middle, last
             count += 2
-        node += 1
-    centre, radius = np.zeros((count, 3)), np.zeros(count)
-    for node in range(count):
-        total = 0.0
-        for k in range(start[node], stop[node]):
+        total, x, y, z = 0.0, 0.0, 0.0, 0.0
+        for k in range(first, last):
             total += areas[k]
-            centre[node] += areas[k] * points[k]
-        centre[node] /= total
-        for k in range(start[node], stop[node]):
-            d = points[k] - centre[node]
-            radius[node] = max(radius[node], np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
-    return start[:count], stop[:count], child[:count], centre, radius
+            x += areas[k] * points[k, 0]
+            y += areas[k] * points[k, 1]
+            z += areas[k] * points[k, 2]
+        x, y, z = x / total, y / total, z / total
+        farthest = 0.0
+        for k in range(first, last):
+            dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
+            squared = dx * dx + dy * dy + dz * dz
+            if squared > farthest:
+                farthest = squared
+        centre[node, 0], centre[node, 1], centre[node, 2] = x, y, z
+        radius[node] = math.sqrt(farthest)
+        node += 1
+    return count
 
 
 @compiled()
-def _moments(dipoles, start, stop):  # type: ignore[no-untyped-def]
-    sums = np.zeros((len(start), 3))
+def _moments(dipoles, start, stop, sums):  # type: ignore[no-untyped-def]
     for node in range(len(start)):
         for k in range(start[node], stop[node]):
             for d in range(3):
                 sums[node, d] += dipoles[k, d]
-    return sums
-
-
-@compiled(nogil=True, fastmath=True, error_model="numpy")
-def _add(count, source, queries, eps, first, last, out):  # type: ignore[no-untyped-def]
-    """Add what sources cause at the queries of a group; columns of positions and dipoles, so that it vectorises.
-
-    -4 pi grad w = sum_j m_j / r^3 - 3 (m_j . d) d / r^5 and 4 pi w = sum_j m_j . d / r^3, with d = p_j - x,
-    r^2 = |d|^2 + eps^2 and m_j = a_j n_j.
-    """
-    px, py, pz, mx, my, mz = source[0], source[1], source[2], source[3], source[4], source[5]
-    for i in range(first, last):
-        if eps[i] == 0.0:
-            continue
-        x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
-        squared = eps[i] * eps[i]
-        gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0
-        for j in range(count):
-            dx, dy, dz = px[j] - x, py[j] - y, pz[j] - z
-            inverse = 1.0 / (dx * dx + dy * dy + dz * dz + squared)
-            cube = inverse * np.sqrt(inverse)
-            along = (dx * mx[j] + dy * my[j] + dz * mz[j]) * cube
-            w += along
-            along *= 3.0 * inverse
-            gx += mx[j] * cube - along * dx
-            gy += my[j] * cube - along * dy
-            gz += mz[j] * cube - along * dz
-        out[i, 0] += gx
-        out[i, 1] += gy
-        out[i, 2] += gz
-        out[i, 3] += w
 
 
 @compiled(nogil=True, fastmath=True, error_model="numpy")
 def _dipole_sums(  # type: ignore[no-untyped-def]
-    first, last, queries, themselves, points, dipoles, eps, start, stop, child, centre, radius, moments, opening, out
-):
-    """Sum `_add` over all points, for groups of GROUP queries in a row: they share one walk down the tree.
+    first, last, queries, themselves, points, dipoles, eps, start, stop, child, centre, radius, moments, opening,
+    stack, source, out,
+):  # fmt: skip
+    """Sum what all points cause, for groups of GROUP queries in a row: they share one walk down the tree.
+
+    -4 pi grad w = sum_j m_j / r^3 - 3 (m_j . d) d / r^5 and 4 pi w = sum_j m_j . d / r^3, with d = p_j - x,
+    r^2 = |d|^2 + eps^2 and m_j = a_j n_j.
 
     A node is far where it is from every query of the group. Queries that are the points themselves leave themselves
-    out. Sources are collected, and added a list at a time.
+    out. Sources are collected, and added a list at a time: columns of positions and dipoles, so that it vectorises.
     """
-    stack = np.empty(STACK, np.int64)
-    source = np.empty((6, LIST))
-    own = np.empty((6, 1))
+    px, py, pz, mx, my, mz = source[0], source[1], source[2], source[3], source[4], source[5]
     for group in range(first, last):
-        begin, end = group * GROUP, min((group + 1) * GROUP, len(queries))
+        begin, end = group * GROUP, (group + 1) * GROUP
+        if end > len(queries):
+            end = len(queries)
         x, y, z = 0.0, 0.0, 0.0
         wanted = 0
         for i in range(begin, end):
@@ -224,46 +210,81 @@ def _dipole_sums(  # type: ignore[no-untyped-def]
         for i in range(begin, end):
             if eps[i] != 0.0:
                 dx, dy, dz = queries[i, 0] - x, queries[i, 1] - y, queries[i, 2] - z
-                reach = max(reach, dx * dx + dy * dy + dz * dz)
-        reach = opening * np.sqrt(reach)
-        count = 0
+                squared = dx * dx + dy * dy + dz * dz
+                if squared > reach:
+                    reach = squared
+        reach = opening * math.sqrt(reach)
         stack[0] = 0
         top = 1
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            dx, dy, dz = centre[node, 0] - x, centre[node, 1] - y, centre[node, 2] - z
-            least = radius[node] + reach
-            if least * least < opening * opening * (dx * dx + dy * dy + dz * dz):
-                if count == LIST:
-                    _add(count, source, queries, eps, begin, end, out)
-                    count = 0
-                for d in range(3):
-                    source[d, count] = centre[node, d]
-                    source[3 + d, count] = moments[node, d]
-                count += 1
-            elif child[node] >= 0:
-                stack[top] = child[node]
-                stack[top + 1] = child[node] + 1
-                top += 2
-            else:
-                for k in range(start[node], stop[node]):
+        # The rest of the leaf at hand.
+        at, upto = 0, 0
+        walking = True
+        while walking:
+            count = 0
+            while count < LIST:
+                if at < upto:
+                    k = at
+                    at += 1
                     # The group's own points follow below: each must leave out itself.
                     if themselves and begin <= k < end:
                         continue
-                    if count == LIST:
-                        _add(count, source, queries, eps, begin, end, out)
-                        count = 0
                     for d in range(3):
                         source[d, count] = points[k, d]
                         source[3 + d, count] = dipoles[k, d]
                     count += 1
-        _add(count, source, queries, eps, begin, end, out)
+                elif top > 0:
+                    top -= 1
+                    node = stack[top]
+                    dx, dy, dz = centre[node, 0] - x, centre[node, 1] - y, centre[node, 2] - z
+                    least = radius[node] + reach
+                    if least * least < opening * opening * (dx * dx + dy * dy + dz * dz):
+                        for d in range(3):
+                            source[d, count] = centre[node, d]
+                            source[3 + d, count] = moments[node, d]
+                        count += 1
+                    elif child[node] >= 0:
+                        stack[top] = child[node]
+                        stack[top + 1] = child[node] + 1
+                        top += 2
+                    else:
+                        at, upto = start[node], stop[node]
+                else:
+                    walking = False
+                    break
+            for i in range(begin, end):
+                if eps[i] == 0.0:
+                    continue
+                x0, y0, z0, squared = queries[i, 0], queries[i, 1], queries[i, 2], eps[i] * eps[i]
+                gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0
+                for j in range(count):
+                    dx, dy, dz = px[j] - x0, py[j] - y0, pz[j] - z0
+                    inverse = 1.0 / (dx * dx + dy * dy + dz * dz + squared)
+                    cube = inverse * math.sqrt(inverse)
+                    along = (dx * mx[j] + dy * my[j] + dz * mz[j]) * cube
+                    w += along
+                    along *= 3.0 * inverse
+                    gx += mx[j] * cube - along * dx
+                    gy += my[j] * cube - along * dy
+                    gz += mz[j] * cube - along * dz
+                out[i, 0] += gx
+                out[i, 1] += gy
+                out[i, 2] += gz
+                out[i, 3] += w
         if not themselves:
             continue
         for k in range(begin, end):
-            for d in range(3):
-                own[d, 0] = points[k, d]
-                own[3 + d, 0] = dipoles[k, d]
-            _add(1, own, queries, eps, begin, k, out)
-            _add(1, own, queries, eps, k + 1, end, out)
+            for i in range(begin, end):
+                if i == k or eps[i] == 0.0:
+                    continue
+                dx, dy, dz = points[k, 0] - queries[i, 0], points[k, 1] - queries[i, 1], points[k, 2] - queries[i, 2]
+                inverse = 1.0 / (dx * dx + dy * dy + dz * dz + eps[i] * eps[i])
+                cube = inverse * math.sqrt(inverse)
+                w = (dx * dipoles[k, 0] + dy * dipoles[k, 1] + dz * dipoles[k, 2]) * cube
+                along = w * (3.0 * inverse)
+                gx = dipoles[k, 0] * cube - along * dx
+                gy = dipoles[k, 1] * cube - along * dy
+                gz = dipoles[k, 2] * cube - along * dz
+                out[i, 0] += gx
+                out[i, 1] += gy
+                out[i, 2] += gz
+                out[i, 3] += w

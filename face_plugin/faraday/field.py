@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,14 +34,16 @@ def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.
     >>> vertex_gradients(mesh, corners @ np.array([[1.0], [2.0], [3.0]]))[0].ravel()
     array([1., 2., 3.])
     """
-    return np.asarray(_vertex_gradients(mesh.vertices, mesh.tets, np.ascontiguousarray(values)))
+    out = np.zeros((len(mesh.vertices), 3, values.shape[1]))
+    weight = np.zeros(len(mesh.vertices))
+    _add_gradients(mesh.vertices, mesh.tets, np.ascontiguousarray(values), out, weight)
+    used = weight > 0
+    out[used] /= weight[used, None, None]
+    return out
 
 
 @compiled()
-def _vertex_gradients(vertices, tets, values):  # type: ignore[no-untyped-def]
-    scenarios = values.shape[1]
-    out = np.zeros((len(vertices), 3, scenarios))
-    weight = np.zeros(len(vertices))
+def _add_gradients(vertices, tets, values, out, weight):  # type: ignore[no-untyped-def]
     # Scalars throughout: an array for each edge vector would be allocated on the heap, and take four times as long.
     for t in range(len(tets)):
         p, q, r, s = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
@@ -52,22 +56,19 @@ def _vertex_gradients(vertices, tets, values):  # type: ignore[no-untyped-def]
         n3x, n3y, n3z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
         # Six volumes times the gradient: the volume weight needs no division.
         six = ax * n1x + ay * n1y + az * n1z
-        for v in (p, q, r, s):
-            weight[v] += six
-        for k in range(scenarios):
+        for i in range(4):
+            weight[tets[t, i]] += six
+        for k in range(values.shape[1]):
             base = values[p, k]
             dq, dr, ds = values[q, k] - base, values[r, k] - base, values[s, k] - base
             gx = n1x * dq + n2x * dr + n3x * ds
             gy = n1y * dq + n2y * dr + n3y * ds
             gz = n1z * dq + n2z * dr + n3z * ds
-            for v in (p, q, r, s):
+            for i in range(4):
+                v = tets[t, i]
                 out[v, 0, k] += gx
                 out[v, 1, k] += gy
                 out[v, 2, k] += gz
-    for v in range(len(vertices)):
-        if weight[v] > 0:
-            out[v] /= weight[v]
-    return out
 
 
 def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -90,33 +91,38 @@ def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
     >>> strength_exact(np.diag([1.0, -3.0, 2.0])[None])
     array([3.])
     """
-    return np.asarray(_strength_exact(np.ascontiguousarray(gradients)))
-
-
-@compiled()
-def _strength_exact(gradients):  # type: ignore[no-untyped-def]
-    """Largest eigenvalue of G^T G from the trigonometric solution of its characteristic cubic."""
     out = np.empty(len(gradients))
-    for i in range(len(gradients)):
-        g = gradients[i]
+    _strength_exact(np.ascontiguousarray(gradients), out)
+    return out
+
+
+@compiled(error_model="numpy")
+def _strength_exact(g, out):  # type: ignore[no-untyped-def]
+    """Largest eigenvalue of G^T G from the trigonometric solution of its characteristic cubic."""
+    for i in range(len(g)):
         # Scalars throughout, as above.
-        m00 = g[0, 0] * g[0, 0] + g[1, 0] * g[1, 0] + g[2, 0] * g[2, 0]
-        m11 = g[0, 1] * g[0, 1] + g[1, 1] * g[1, 1] + g[2, 1] * g[2, 1]
-        m22 = g[0, 2] * g[0, 2] + g[1, 2] * g[1, 2] + g[2, 2] * g[2, 2]
-        m01 = g[0, 0] * g[0, 1] + g[1, 0] * g[1, 1] + g[2, 0] * g[2, 1]
-        m02 = g[0, 0] * g[0, 2] + g[1, 0] * g[1, 2] + g[2, 0] * g[2, 2]
-        m12 = g[0, 1] * g[0, 2] + g[1, 1] * g[1, 2] + g[2, 1] * g[2, 2]
+        m00 = g[i, 0, 0] * g[i, 0, 0] + g[i, 1, 0] * g[i, 1, 0] + g[i, 2, 0] * g[i, 2, 0]
+        m11 = g[i, 0, 1] * g[i, 0, 1] + g[i, 1, 1] * g[i, 1, 1] + g[i, 2, 1] * g[i, 2, 1]
+        m22 = g[i, 0, 2] * g[i, 0, 2] + g[i, 1, 2] * g[i, 1, 2] + g[i, 2, 2] * g[i, 2, 2]
+        m01 = g[i, 0, 0] * g[i, 0, 1] + g[i, 1, 0] * g[i, 1, 1] + g[i, 2, 0] * g[i, 2, 1]
+        m02 = g[i, 0, 0] * g[i, 0, 2] + g[i, 1, 0] * g[i, 1, 2] + g[i, 2, 0] * g[i, 2, 2]
+        m12 = g[i, 0, 1] * g[i, 0, 2] + g[i, 1, 1] * g[i, 1, 2] + g[i, 2, 1] * g[i, 2, 2]
         q = (m00 + m11 + m22) / 3.0
-        off = m01**2 + m02**2 + m12**2
-        p = np.sqrt(((m00 - q) ** 2 + (m11 - q) ** 2 + (m22 - q) ** 2 + 2.0 * off) / 6.0)
+        off = m01 * m01 + m02 * m02 + m12 * m12
+        d00, d11, d22 = m00 - q, m11 - q, m22 - q
+        p = math.sqrt((d00 * d00 + d11 * d11 + d22 * d22 + 2.0 * off) / 6.0)
         largest = q
         if p > 1e-14 * q:
-            b00, b11, b22 = (m00 - q) / p, (m11 - q) / p, (m22 - q) / p
+            b00, b11, b22 = d00 / p, d11 / p, d22 / p
             b01, b02, b12 = m01 / p, m02 / p, m12 / p
             half = 0.5 * (b00 * (b11 * b22 - b12 * b12) - b01 * (b01 * b22 - b12 * b02) + b02 * (b01 * b12 - b11 * b02))
-            largest = q + 2.0 * p * np.cos(np.arccos(min(1.0, max(-1.0, half))) / 3.0)
-        out[i] = np.sqrt(max(largest, 0.0))
-    return out
+            # Rounding may carry the cosine past 1.
+            if half > 1.0:
+                half = 1.0
+            elif half < -1.0:
+                half = -1.0
+            largest = q + 2.0 * p * math.cos(math.acos(half) / 3.0)
+        out[i] = math.sqrt(largest) if largest > 0.0 else 0.0
 
 
 def half_icosahedron() -> NDArray[np.float64]:

@@ -142,64 +142,56 @@ def stiffness(vertices: NDArray[np.float64], tets: NDArray[np.int32], column: ND
     """
     free, box = int(np.count_nonzero(column >= 0)), int(np.count_nonzero(column < -1))
     flat = np.where(column >= 0, column, np.where(column < -1, free - 2 - column, free + box))
-    start, index, value = _assemble(vertices, tets, flat, free)
-    return sparse.csr_matrix((value, index, start), shape=(free, free + box + 1))
-
-
-@compiled()
-def _local(vertices, tet, s):  # type: ignore[no-untyped-def]
-    """Fill s (4, 4) with the local stiffness matrix of a tetrahedron.
-
-    grad(phi_i) = -n_i / (3 volume), with n_i the area-weighted outward normal of the facet without vertex i.
-    """
-    a = vertices[tet[1]] - vertices[tet[0]]
-    b = vertices[tet[2]] - vertices[tet[0]]
-    c = vertices[tet[3]] - vertices[tet[0]]
-    n = np.empty((4, 3))
-    for i, p, q in ((1, b, c), (2, c, a), (3, a, b)):
-        n[i, 0] = p[1] * q[2] - p[2] * q[1]
-        n[i, 1] = p[2] * q[0] - p[0] * q[2]
-        n[i, 2] = p[0] * q[1] - p[1] * q[0]
-    for k in range(3):
-        n[0, k] = -n[1, k] - n[2, k] - n[3, k]
-    six = a[0] * n[1, 0] + a[1] * n[1, 1] + a[2] * n[1, 2]
-    for i in range(4):
-        for j in range(i, 4):
-            s[i, j] = (n[i, 0] * n[j, 0] + n[i, 1] * n[j, 1] + n[i, 2] * n[j, 2]) / (6.0 * six)
-            s[j, i] = s[i, j]
-
-
-@compiled()
-def _assemble(vertices, tets, flat, free):  # type: ignore[no-untyped-def]
-    """CSR rows of the free vertices: entries are dropped into their rows, then merged along each."""
+    row = flat[tets.ravel()]
     start = np.zeros(free + 1, dtype=np.int64)
+    np.cumsum(4 * np.bincount(row[row < free], minlength=free), out=start[1:])
+    index, value = np.empty(start[-1], dtype=np.int32), np.empty(start[-1])
+    _fill_rows(vertices, tets, flat, free, np.empty((4, 3)), start[:-1].copy(), index, value)
+    merged = np.zeros_like(start)
+    _merge_rows(start, np.full(free + box + 1, -1), index, value, merged)
+    count = merged[-1]
+    return sparse.csr_matrix((value[:count].copy(), index[:count].copy(), merged), shape=(free, free + box + 1))
+
+
+@compiled(error_model="numpy")
+def _fill_rows(vertices, tets, flat, free, normal, fill, index, value):  # type: ignore[no-untyped-def]
+    """Drop the entries of all tetrahedra into the rows of their free vertices, from `fill` (f,) on.
+
+    grad(phi_i) = -n_i / (3 volume), with n_i the area-weighted outward normal of the facet without vertex i; `normal`
+    (4, 3) is room for these.
+    """
     for t in range(len(tets)):
-        for i in range(4):
-            row = flat[tets[t, i]]
-            if row < free:
-                start[row + 1] += 4
-    for row in range(free):
-        start[row + 1] += start[row]
-    index = np.empty(start[free], dtype=np.int32)
-    value = np.empty(start[free])
-    fill = start[:free].copy()
-    s = np.empty((4, 4))
-    for t in range(len(tets)):
-        if min(flat[tets[t, 0]], flat[tets[t, 1]], flat[tets[t, 2]], flat[tets[t, 3]]) >= free:
+        p, q, r, s = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
+        if flat[p] >= free and flat[q] >= free and flat[r] >= free and flat[s] >= free:
             continue
-        _local(vertices, tets[t], s)
+        x, y, z = vertices[p, 0], vertices[p, 1], vertices[p, 2]
+        ax, ay, az = vertices[q, 0] - x, vertices[q, 1] - y, vertices[q, 2] - z
+        bx, by, bz = vertices[r, 0] - x, vertices[r, 1] - y, vertices[r, 2] - z
+        cx, cy, cz = vertices[s, 0] - x, vertices[s, 1] - y, vertices[s, 2] - z
+        normal[1, 0], normal[1, 1], normal[1, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        normal[2, 0], normal[2, 1], normal[2, 2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+        normal[3, 0], normal[3, 1], normal[3, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        for d in range(3):
+            normal[0, d] = -normal[1, d] - normal[2, d] - normal[3, d]
+        six = ax * normal[1, 0] + ay * normal[1, 1] + az * normal[1, 2]
         for i in range(4):
             row = flat[tets[t, i]]
             if row < free:
                 for j in range(4):
+                    dot = normal[i, 0] * normal[j, 0] + normal[i, 1] * normal[j, 1] + normal[i, 2] * normal[j, 2]
                     index[fill[row]] = flat[tets[t, j]]
-                    value[fill[row]] = s[i, j]
+                    value[fill[row]] = dot / (6.0 * six)
                     fill[row] += 1
-    # A column's place in the current row, or -1: merges duplicates without sorting.
-    place = np.full(flat.max() + 1, -1, dtype=np.int64)
-    merged = np.zeros(free + 1, dtype=np.int64)
+
+
+@compiled()
+def _merge_rows(start, place, index, value, merged):  # type: ignore[no-untyped-def]
+    """Merge the entries of one column along each row, in place; fill in where the rows then start.
+
+    `place` holds the place of each column in the current row, or -1: that merges without sorting.
+    """
     out = 0
-    for row in range(free):
+    for row in range(len(start) - 1):
         begin = out
         for k in range(start[row], start[row + 1]):
             j = index[k]
@@ -211,7 +203,6 @@ def _assemble(vertices, tets, flat, free):  # type: ignore[no-untyped-def]
             else:
                 value[place[j]] += value[k]
         merged[row + 1] = out
-    return merged, index[:out].copy(), value[:out].copy()
 
 
 def cage_to_box(mesh: CageMesh) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,9 @@ def tet_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArr
     >>> tet_volumes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]], dtype=np.int32)).round(3)
     array([0.167])
     """
-    return np.asarray(_volumes(vertices, tets))
+    first, *others = (vertices[column] for column in tets.T)
+    a, b, c = (other - first for other in others)
+    return np.asarray(np.einsum("td,td->t", np.cross(a, b), c) / 6.0)
 
 
 def oriented(vertices: NDArray[np.float64], tets: NDArray[np.int32], flat: float) -> NDArray[np.int32]:
@@ -60,65 +63,53 @@ def oriented(vertices: NDArray[np.float64], tets: NDArray[np.int32], flat: float
     >>> oriented(np.vstack([np.zeros(3), np.eye(3)]), np.array([[1, 0, 2, 3]], dtype=np.int32), 1e-14)
     array([[0, 1, 2, 3]], dtype=int32)
     """
-    tets = np.ascontiguousarray(tets)
-    _nearest_first(vertices, tets)
-    volume = _volumes(vertices, tets)
-    tets[volume < 0] = tets[volume < 0][:, [0, 2, 1, 3]]
-    return np.asarray(tets[_heights(vertices, tets, volume) > flat])
+    tets = np.array(tets, order="C")
+    height = np.empty(len(tets))
+    _turn(vertices, tets, height)
+    return tets[height > flat]
 
 
-@compiled()
-def _cross(vertices, i, j, k):  # type: ignore[no-untyped-def]
-    """Return the normal of a triangle, as long as twice its area."""
-    ax, ay, az = (
-        vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
-    )  # fmt: skip
-    bx, by, bz = (
-        vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
-    )  # fmt: skip
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+@compiled(error_model="numpy")
+def _turn(vertices, tets, height):  # type: ignore[no-untyped-def]
+    """Put the vertex with the shortest edges first, turn tetrahedra positive, and fill in the least height of each.
 
-
-@compiled()
-def _volumes(vertices, tets):  # type: ignore[no-untyped-def]
-    out = np.empty(len(tets))
+    A height is three volumes over the area of a facet.
+    """
     for t in range(len(tets)):
-        i, j, k, apex = tets[t]
-        n = _cross(vertices, i, j, k)
-        six = 0.0
-        for d in range(3):
-            six += n[d] * (vertices[apex, d] - vertices[i, d])
-        out[t] = six / 6.0
-    return out
-
-
-@compiled()
-def _nearest_first(vertices, tets):  # type: ignore[no-untyped-def]
-    for t in range(len(tets)):
-        best, shortest = 0, np.inf
+        first, shortest = 0, math.inf
         for i in range(4):
             total = 0.0
             for j in range(4):
                 for d in range(3):
-                    total += (vertices[tets[t, i], d] - vertices[tets[t, j], d]) ** 2
+                    off = vertices[tets[t, i], d] - vertices[tets[t, j], d]
+                    total += off * off
             if total < shortest:
-                best, shortest = i, total
-        tets[t, 0], tets[t, best] = tets[t, best], tets[t, 0]
-
-
-@compiled()
-def _heights(vertices, tets, volume):  # type: ignore[no-untyped-def]
-    """Least height of each tetrahedron: three volumes over its largest facet."""
-    out = np.zeros(len(tets))
-    for t in range(len(tets)):
-        largest = 0.0
-        for i in range(4):
-            # The facet without vertex i; its own first vertex is the nearest one where it has it.
-            n = _cross(vertices, tets[t, 1 if i == 0 else 0], tets[t, 2 if i < 2 else 1], tets[t, 3 if i < 3 else 2])
-            largest = max(largest, n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
-        if largest > 0:
-            out[t] = 6.0 * abs(volume[t]) / np.sqrt(largest)
-    return out
+                first, shortest = i, total
+        nearest = tets[t, first]
+        tets[t, first] = tets[t, 0]
+        tets[t, 0] = nearest
+        volume, largest = 0.0, 0.0
+        # The facets without vertex 3, 2, 1, 0; the first vertex of a facet is the nearest one where it has it.
+        for without in range(3, -1, -1):
+            a = tets[t, 1] if without == 0 else tets[t, 0]
+            b = tets[t, 2] if without < 2 else tets[t, 1]
+            c = tets[t, 3] if without < 3 else tets[t, 2]
+            x, y, z = vertices[a, 0], vertices[a, 1], vertices[a, 2]
+            bx, by, bz = vertices[b, 0] - x, vertices[b, 1] - y, vertices[b, 2] - z
+            cx, cy, cz = vertices[c, 0] - x, vertices[c, 1] - y, vertices[c, 2] - z
+            nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+            squared = nx * nx + ny * ny + nz * nz
+            if squared > largest:
+                largest = squared
+            if without == 3:
+                apex = tets[t, 3]
+                volume = (
+                    nx * (vertices[apex, 0] - x) + ny * (vertices[apex, 1] - y) + nz * (vertices[apex, 2] - z)
+                ) / 6.0
+                if volume < 0.0:
+                    tets[t, 1], tets[t, 2] = c, b
+                    volume = -volume
+        height[t] = 6.0 * volume / math.sqrt(largest) if largest > 0.0 else 0.0
 
 
 def faces_of_solid(balls: Balls) -> NDArray[np.int32]:

@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.angles.borders import bend_borders
-from face_plugin.angles.fits import choose_quadric
 from face_plugin.angles.levelling import level, level_weight
-from face_plugin.angles.turning import kernel_width, turn_angles
+from face_plugin.angles.turning import turn_angles
 from face_plugin.faraday import field
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.faraday.solve import SolvedCage, solve_cage
-from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
@@ -146,6 +144,7 @@ def refine(
 
     Examples
     --------
+    >>> from face_plugin.geometry import unit
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(500)
     >>> rough = unit(ball.normals + 0.3 * np.random.default_rng(0).normal(size=(500, 3)))
@@ -153,7 +152,7 @@ def refine(
     >>> bool(((refined * ball.normals).sum(axis=1) > 0.99).all())
     True
     """
-    points, distance, neighbour, tree = around.points, around.distance, around.neighbour, around.tree
+    points, neighbour = around.points, around.neighbour
     still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
     # Plates thinner than the spacing look like noise: there the field alone tells the side, and a fit the angle.
     plate = back_to_back(around, votes)
@@ -161,16 +160,14 @@ def refine(
     # 1. Side: stray points turn round to those around them.
     side = turn_sides(around, votes, strength, sheets or find_sheets(around), plate | still)
 
-    # 2. Angle: from a fit where points scatter, from a narrow kernel where they resolve the surface. Where nothing is
-    # known and nothing moved, any direction will do for the fit.
-    fitted, scatter, residual = choose_quadric(points, unit(side), neighbour, around.spacing)
-    scatter[plate] = 1.0
-    width = np.where(still, 0.0, kernel_width(distance, around.spacing))
-    refined = turn_angles(tree, side, fitted, scatter, width, distance, neighbour)
+    # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending
+    # allows, and from a narrow kernel where the points only just resolve the surface.
+    turned = turn_angles(around, side, plate, still)
 
     # 3. Borders: where a sheet ends in the open, the field has a say in the angle as well.
-    refined = bend_borders(points, refined, votes, strength, neighbour)
+    refined = bend_borders(points, turned.normals, votes, strength, neighbour)
 
     # 4. Level: the surface that the normals describe together is made to pass through the points.
-    refined = level(tree, refined, neighbour, width, level_weight(distance, neighbour, scatter, residual))
+    weight = level_weight(around.distance, neighbour, 1.0 - turned.resolved, turned.residual)
+    refined = level(around.tree, refined, neighbour, turned.width, weight)
     return np.where(still[:, None], votes, refined)

@@ -17,6 +17,9 @@ BORDER = (0.3, 0.5)
 OPEN = (1.0, 3.0)
 # How much of the field's direction across the border is added.
 BEND = 0.8
+# A sheet that is flat up to its border goes on flat: at most this many times what the normals of the neighbours differ
+# by (root mean square, radians) is added.
+GOES_ON = 4.0
 
 
 def bend_borders(
@@ -26,7 +29,7 @@ def bend_borders(
     strength: NDArray[np.float64],
     neighbour: NDArray[np.intp],
 ) -> NDArray[np.float64]:
-    """Bend the normals at open borders outward over them.
+    """Bend the normals at open borders of curved sheets outward over them.
 
     A fit to the points takes it that the sheet goes straight on beyond its border, and a reconstruction then runs on
     into the empty. The closed surface turns in there. Charges crowd at a free border, and the field at it points away
@@ -50,19 +53,23 @@ def bend_borders(
     Examples
     --------
     >>> from scipy.spatial import cKDTree
-    >>> x, y = np.meshgrid(np.arange(9.0), np.arange(9.0))
-    >>> sheet = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
-    >>> up = np.tile([0.0, 0.0, 1.0], (81, 1))
-    >>> away = unit(sheet - [4.0, 4.0, -4.0])
-    >>> bent = bend_borders(sheet, up, away, np.full(81, 3.0), cKDTree(sheet).query(sheet, k=25)[1])
-    >>> bool(bent[40, 2] == 1.0), bool(bent[44, 0] > 0.2)
+    >>> x, y = (a.ravel() for a in np.meshgrid(np.arange(-4.0, 5.0), np.arange(-4.0, 5.0)))
+    >>> dome = np.stack([x, y, np.sqrt(100.0 - x**2 - y**2)], axis=1)
+    >>> near = cKDTree(dome).query(dome, k=25)[1]
+    >>> bent = bend_borders(dome, dome / 10, unit(dome * [1, 1, 0]), np.full(81, 3.0), near)
+    >>> bool(bent[40, 2] > 0.999), bool(bent[44, 0] > dome[44, 0] / 10 + 0.2)
     (True, True)
     """
-    offset = points[neighbour[:, 1 : NEIGHBOURS + 1]] - points[:, None]
+    near = neighbour[:, 1 : NEIGHBOURS + 1]
+    offset = points[near] - points[:, None]
+    # A fold is no border: seen along the mean normal, its two faces surround the point.
+    mean = normals[near].mean(axis=1)
+    bent = np.sqrt(2.0 * np.maximum(1.0 - np.linalg.norm(mean, axis=1), 0.0))
+    mean = unit(mean)
     inward = offset.mean(axis=1)
-    inward -= normals * np.einsum("nd,nd->n", inward, normals)[:, None]
+    inward -= mean * np.einsum("nd,nd->n", inward, mean)[:, None]
     off_centre = np.linalg.norm(inward, axis=1) / np.linalg.norm(offset, axis=2).mean(axis=1)
     over = -unit(inward)
     across = np.maximum(np.einsum("nd,nd->n", field_normals, over), 0.0)
     is_open = ramp(off_centre, BORDER) * log_ramp(strength, OPEN)
-    return unit(normals + (BEND * is_open * across)[:, None] * over)
+    return unit(normals + np.minimum(BEND * is_open * across, GOES_ON * bent)[:, None] * over)

@@ -1,85 +1,114 @@
-"""Angles of normals whose side is known: from fits where points scatter, from narrow kernels where they do not."""
+"""The line of each normal: from fits where these are good, from narrow kernels where points are few."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.geometry import plane_fit, unit
-from face_plugin.winding import DipoleTree
+from face_plugin.angles.choice import FLATNESS, combine_fits
+from face_plugin.angles.fits import LocalFits, fit_surfaces
+from face_plugin.angles.noise import find_noise
+from face_plugin.geometry import unit
+from face_plugin.neighbourhood import Neighbourhood
 
-__all__ = ["kernel_width", "turn_angles"]
+__all__ = ["Turned", "turn_angles"]
 
-# Angle where the surface is resolved: steps, kernel width in spacings, weight of the plane through 6 neighbours.
-ANGLE_STEPS = 6
-ANGLE_WIDTH = 0.1
-PLANE_WEIGHT = 0.3
-PLANE = (6, 0.7)
-# Where the neighbourhood scatters more than this on average, the narrow kernel may not overrule the side.
-OVERRULE = 0.02
-# A neighbour nearer than this many spacings is a near-duplicate: the kernel is widened to it.
+# Steps of the narrow kernel, after the first fits and after the second: these start from normals that the first made
+# accurate, so that neighbours beyond an edge are told by them.
+STEPS = (3, 6)
+# Width of the kernel, in spacings, and the least distance at which it sees another point: it is widened where one is
+# nearer, as near-duplicates are.
+WIDTH = 0.1
 NEAREST = 0.6
+# Expected error of the kernel, as that of the fits: what the smallest quadrics around leave beyond the noise, in
+# spacings, times the first; and the noise, its variance times their gain, times the second.
+ROUGH = 2.0
+NOISY = 12.0
+# Where the kernel's part would be less than this, it is not computed.
+LEAST_PART = 0.02
 
 
-def kernel_width(distance: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Width (n,) of the narrow kernel: a tenth of the spacing, more where the nearest point is a near-duplicate."""
-    return np.asarray(np.sqrt(np.maximum((NEAREST * spacing) ** 2 - distance[:, 1] ** 2, (ANGLE_WIDTH * spacing) ** 2)))
+@dataclass(frozen=True)
+class Turned:
+    """Normals, and what else their angles tell of the surface."""
+
+    normals: NDArray[np.float64]
+    """(n, 3) unit normals."""
+    resolved: NDArray[np.float64]
+    """(n,) the narrow kernel's part in them, in [0, 1]: 1 where every point tells something new of the surface, 0 where
+    it is flat or the points scatter about it."""
+    width: NDArray[np.float64]
+    """(n,) of the kernel at each point; 0 where it had no part."""
+    residual: NDArray[np.float64]
+    """(n,) root mean square height of points about the smallest quadrics, in spacings."""
 
 
 def turn_angles(
-    tree: DipoleTree,
-    side: NDArray[np.float64],
-    fitted: NDArray[np.float64],
-    scatter: NDArray[np.float64],
-    width: NDArray[np.float64],
-    distance: NDArray[np.float64],
-    neighbour: NDArray[np.intp],
-) -> NDArray[np.float64]:
-    """Turn normals of the right side to the angle that the fits and narrow kernels tell.
+    around: Neighbourhood, side: NDArray[np.float64], plate: NDArray[np.bool_], still: NDArray[np.bool_]
+) -> Turned:
+    """Turn normals of the right side to the angle that the points tell.
 
     Parameters
     ----------
-    tree : DipoleTree
+    around : Neighbourhood
         Of the points.
     side : (n, 3) float64
-        Unit normals of the right side.
-    fitted : (n, 3) float64
-        Unit normals of quadrics, of either sign.
-    scatter : (n,) float64
-        How much the points scatter about their surface, in [0, 1].
-    width : (n,) float64
-        Of the narrow kernel at each point; 0: the normal stays.
-    distance, neighbour : (n, k) float64, (n, k) intp
-        Of the nearest points, ascending, the point itself first.
+        Unit normals, most of them on the right side, accurate to some tens of degrees; zero where nothing is known.
+    plate : (n,) bool
+        Points of plates thinner than the spacing: the kernel would see both sides as one.
+    still : (n,) bool
+        Points whose normals stay as they are.
 
     Returns
     -------
-    (n, 3) float64
-        Unit normals.
+    Turned
+        Normals on the side of `side`.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import box
+    >>> cube = box(1000)
+    >>> nobody = np.zeros(1000, dtype=bool)
+    >>> turned = turn_angles(Neighbourhood(cube.points), cube.normals, nobody, nobody)
+    >>> bool(((turned.normals * cube.normals).sum(axis=1) > 0.999).mean() > 0.98)
+    True
     """
-    plane = plane_fit(tree.points, distance, neighbour, min(PLANE[0], len(side) - 1), PLANE[1])
-    refined = _angles(tree, side, fitted, plane, scatter, width)
-    settled = scatter[neighbour].mean(axis=1) > OVERRULE
-    return np.where(settled[:, None], _along(refined, side), refined)
+    normals = side = unit(side)
+    spacing = around.spacing
+    wide = np.sqrt(np.maximum((NEAREST * spacing) ** 2 - around.distance[:, 1] ** 2, (WIDTH * spacing) ** 2))
+    for steps in STEPS:
+        fits = fit_surfaces(around.points, normals, around.neighbour)
+        noise, least = find_noise(around.points, fits, around.neighbour)
+        line, error = combine_fits(around.points, normals, around.neighbour, fits, noise)
+        fitted = np.where(still[:, None], side, _along(line, side))
+        kernel_error = _kernel_error(fits, noise, least, spacing)
+        # Each by the inverse of its expected squared error.
+        part = np.where(np.isfinite(error), 1.0 / (1.0 + kernel_error / np.where(np.isfinite(error), error, 1.0)), 1.0)
+        part[plate | still | (part < LEAST_PART)] = 0.0
+        width = np.where(part > 0.0, wide, 0.0)
+        normals = fitted
+        for _ in range(steps):
+            narrow = unit(around.tree.outward(normals, width))
+            normals = unit(part[:, None] * narrow + (1.0 - part)[:, None] * fitted)
+        normals = np.where(still[:, None], side, _along(normals, side))
+    return Turned(normals, part, width, np.sqrt(least) / spacing)
 
 
-def _angles(
-    tree: DipoleTree,
-    side: NDArray[np.float64],
-    fitted: NDArray[np.float64],
-    plane: NDArray[np.float64],
-    scatter: NDArray[np.float64],
-    width: NDArray[np.float64],
+def _kernel_error(
+    fits: LocalFits, noise: NDArray[np.float64], least: NDArray[np.float64], spacing: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Turn normals (n, 3) of the right side to the angle that kernels this wide, and the fits, tell; 0: they stay."""
-    still = (width == 0.0)[:, None]
-    resolved = (1.0 - scatter)[:, None]
-    fitted = scatter[:, None] * _along(fitted, side)
-    normals = side
-    for _ in range(ANGLE_STEPS):
-        narrow = unit(tree.outward(normals, width))
-        normals = np.where(still, side, unit(resolved * narrow + fitted))
-    return unit(normals + PLANE_WEIGHT * resolved * _along(plane, normals))
+    """Guess the squared error (n,) of the kernel's normals, in squared radians; infinite where nothing is fitted.
+
+    The kernel sees the nearest points alone: it follows what the smallest fit smooths over, and all of the noise. Where
+    the nearest points lie on a line, as along a row of a scan, the gain of the smallest fit is as large as the kernel
+    is wrong.
+    """
+    if len(fits.reach) == 0:
+        return np.zeros(len(spacing))
+    rough = (ROUGH / spacing) ** 2 * (least - noise)
+    return np.asarray(rough + NOISY * fits.gain[0, :, 1] * (noise + (FLATNESS * fits.reach[0]) ** 2))
 
 
 def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:

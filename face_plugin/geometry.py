@@ -110,7 +110,12 @@ def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> No
         list(pool.map(run, slices))
 
 
-def thin(points: NDArray[np.float64], separation: NDArray[np.float64], seed: int) -> NDArray[np.intp]:
+def thin(
+    points: NDArray[np.float64],
+    separation: NDArray[np.float64],
+    seed: int,
+    found: tuple[NDArray[np.float64], NDArray[np.intp]] | None = None,
+) -> NDArray[np.intp]:
     """Take a Poisson-disk subset: points in random order, each unless one within its separation was taken.
 
     Parameters
@@ -118,6 +123,9 @@ def thin(points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
     points : (n, 3) float64
     separation : (n,) float64, in the points' unit
     seed : int
+    found : ((n, k) float64, (n, k) intp), optional
+        Distances and rows of the nearest points, ascending, where they are known: saves a search, as long as they
+        reach as far as the separation.
 
     Returns
     -------
@@ -134,19 +142,23 @@ def thin(points: NDArray[np.float64], separation: NDArray[np.float64], seed: int
     cell = float(separation.max())
     if cell <= 0:
         return np.arange(len(points))
+    taken = np.zeros(len(points), dtype=np.bool_)
+    # A point exactly as far away as the separation is far enough, whatever rounding says.
+    within = separation * (1 - 1e-12)
+    if found is not None and (found[0].shape[1] == len(points) or (found[0][:, -1] > within).all()):
+        _greedy_among(order, within, np.ascontiguousarray(found[0]), np.ascontiguousarray(found[1]), taken)
+        return np.flatnonzero(taken)
     tree = cKDTree(points)
     nearest = tree.query(points, k=2, workers=-1)[0][:, 1]
     crowded = np.flatnonzero(nearest < separation)
-    taken = np.ones(len(points), dtype=np.bool_)
     if len(crowded) == 0:
-        return np.flatnonzero(taken)
-    lists = tree.query_ball_point(points[crowded], separation[crowded] * (1 - 1e-12), workers=-1)
+        return np.arange(len(points))
+    lists = tree.query_ball_point(points[crowded], within[crowded], workers=-1)
     length = np.fromiter((len(x) for x in lists), dtype=np.int64, count=len(lists))
     start = np.zeros(len(points) + 1, dtype=np.int64)
     start[crowded + 1] = length
     np.cumsum(start, out=start)
     neighbour = np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])
-    taken[:] = False
     _greedy(order, start, neighbour, taken)
     return np.flatnonzero(taken)
 
@@ -159,6 +171,21 @@ def _greedy(order, start, neighbour, taken):  # type: ignore[no-untyped-def]
         free = True
         for j in range(start[i], start[i + 1]):
             if taken[neighbour[j]]:
+                free = False
+                break
+        taken[i] = free
+
+
+@compiled()
+def _greedy_among(order, within, distance, neighbour, taken):  # type: ignore[no-untyped-def]
+    """Do the same by a table of neighbours, as far as each point's separation."""
+    for k in range(len(order)):
+        i = order[k]
+        free = True
+        for j in range(distance.shape[1]):
+            if distance[i, j] > within[i]:
+                break
+            if taken[neighbour[i, j]]:
                 free = False
                 break
         taken[i] = free

@@ -106,6 +106,15 @@ def test_no_separation_keeps_every_point(separation):
     np.testing.assert_array_equal(thin(POINTS, np.full(400, separation), 0), np.arange(400))
 
 
+@pytest.mark.parametrize("reach", [2.0, 1.0])
+def test_known_neighbours_change_nothing_whether_they_reach_far_enough_or_not(reach):
+    distance, neighbour = cKDTree(POINTS).query(POINTS, k=20)
+    separation = distance[:, -1] / reach * np.linspace(0.8, 1.2, len(POINTS))
+    taken = thin(POINTS, separation, 3, (distance, neighbour))
+    np.testing.assert_array_equal(taken, thin(POINTS, separation, 3))
+    assert 5 < len(taken) < 0.5 * len(POINTS)
+
+
 def test_one_ball_alone_is_refused():
     with pytest.raises(ValueError, match="cage_spacing must leave at least 2 balls, found 1 for 400 points"):
         build_balls(POINTS, thin(POINTS, np.full(400, 10.0), 0))

@@ -1,5 +1,6 @@
 """Compiled code: kept where it can be, and said so where it is made or cannot be kept."""
 
+import ast
 import logging
 import os
 import subprocess
@@ -10,6 +11,7 @@ import numba
 import numpy as np
 import pytest
 
+import face_plugin
 from face_plugin import compiled as module
 from face_plugin.app.cli.console import Console
 from face_plugin.compiled import compiled
@@ -96,3 +98,14 @@ def test_what_others_compile_is_not_announced(monkeypatch, caplog):
     with caplog.at_level(logging.INFO):
         numba.njit(lambda x: x + 1)(1)
     assert "compiling" not in caplog.text
+
+
+def test_numba_is_asked_in_one_place_only():
+    root = Path(face_plugin.__file__).parent
+    asking = [
+        path.relative_to(root).as_posix()
+        for path in root.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and node.attr in ("njit", "jit", "vectorize", "guvectorize")
+    ]
+    assert set(asking) == {"compiled.py"}

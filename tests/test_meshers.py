@@ -362,9 +362,10 @@ def test_needles_keep_their_volume():
     base = 1e-9 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
     vertices = np.vstack([[[0.3, 0.4, 0.5]], base]) + 0.123
     exact = 1e-18 * 0.5 / 6
-    turned = oriented(vertices, np.array([[0, 1, 2, 3], [0, 2, 1, 3]], dtype=np.int32), flat=1e-14)
+    turned, volumes = oriented(vertices, np.array([[0, 1, 2, 3], [0, 2, 1, 3]], dtype=np.int32), flat=1e-14)
     assert (turned[:, 0] != 0).all()
     volume = tet_volumes(vertices, turned)
+    np.testing.assert_allclose(volumes, volume, rtol=1e-12)
     # The coordinates themselves are rounded to 1e-17, 1e-8 of the base's edges.
     np.testing.assert_allclose(volume, exact, rtol=1e-6)
 
@@ -372,4 +373,4 @@ def test_needles_keep_their_volume():
 def test_flat_tetrahedra_are_left_out():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1.0]])
     tets = np.array([[0, 1, 2, 3], [0, 1, 2, 4]], dtype=np.int32)
-    assert len(oriented(vertices, tets, flat=1e-14)) == 1
+    assert len(oriented(vertices, tets, flat=1e-14)[0]) == 1

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from face_plugin.compiled import compiled
 from face_plugin.geometry import plane_fit, ramp, thin
 from face_plugin.neighbourhood import Neighbourhood
 
@@ -81,12 +82,28 @@ def next_sheet(
     Needs no orientation: a neighbour along the normal, of either sign, lies on another sheet.
     """
     line = plane_fit(points, distance, neighbour, min(12, distance.shape[1] - 1), 1.0)
-    reach = distance[:, -1].copy()
-    for k in range(1, distance.shape[1]):
-        along = np.abs(np.einsum("nd,nd->n", points[neighbour[:, k]] - points, line))
-        hit = (along > SHEET_COSINE * distance[:, k]) & (distance[:, k] > SHEET_DISTANCE * spacing)
-        np.minimum(reach, np.where(hit, distance[:, k], np.inf), out=reach)
-    return np.asarray(reach)
+    reach = np.empty(len(points))
+    _first_along(points, line, np.ascontiguousarray(distance), np.ascontiguousarray(neighbour), spacing, reach)
+    return reach
+
+
+@compiled()
+def _first_along(points, line, distance, neighbour, spacing, reach):  # type: ignore[no-untyped-def]
+    last = distance.shape[1] - 1
+    for i in range(len(points)):
+        reach[i] = distance[i, last]
+        for k in range(1, last):
+            far = distance[i, k]
+            if far > SHEET_DISTANCE * spacing[i]:
+                j = neighbour[i, k]
+                along = (
+                    (points[j, 0] - points[i, 0]) * line[i, 0]
+                    + (points[j, 1] - points[i, 1]) * line[i, 1]
+                    + (points[j, 2] - points[i, 2]) * line[i, 2]
+                )
+                if abs(along) > SHEET_COSINE * far:
+                    reach[i] = far
+                    break
 
 
 def back_to_back(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -141,7 +158,7 @@ def find_sheets(around: Neighbourhood) -> Sheets:
     """
     points, distance, spacing = around.points, around.distance, around.spacing
     near = next_sheet(points, distance, around.neighbour, spacing)
-    few = points[thin(points, FAR_SPACING * spacing, seed=0)]
+    few = points[thin(points, FAR_SPACING * spacing, seed=0, found=(distance, around.neighbour))]
     far = near
     if len(few) > BULK_NEIGHBOURS:
         wide = Neighbourhood(few)

@@ -52,26 +52,29 @@ def tet_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArr
     return np.asarray(np.einsum("td,td->t", np.cross(a, b), c) / 6.0)
 
 
-def oriented(vertices: NDArray[np.float64], tets: NDArray[np.int32], flat: float) -> NDArray[np.int32]:
-    """Tetrahedra (k, 4) turned positive, without those whose least height is at most `flat`.
+def oriented(
+    vertices: NDArray[np.float64], tets: NDArray[np.int32], flat: float
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Tetrahedra (k, 4) turned positive, without those whose least height is at most `flat`, and their volumes (k,).
 
     The vertex with the shortest edges comes first: differences from the far end of a needle would lose its
     volume, and with it its stiffness, to rounding.
 
     Examples
     --------
-    >>> oriented(np.vstack([np.zeros(3), np.eye(3)]), np.array([[1, 0, 2, 3]], dtype=np.int32), 1e-14)
+    >>> oriented(np.vstack([np.zeros(3), np.eye(3)]), np.array([[1, 0, 2, 3]], dtype=np.int32), 1e-14)[0]
     array([[0, 1, 2, 3]], dtype=int32)
     """
     tets = np.array(tets, order="C")
-    height = np.empty(len(tets))
-    _turn(vertices, tets, height)
-    return tets[height > flat]
+    volume, height = np.empty((2, len(tets)))
+    _turn(vertices, tets, volume, height)
+    solid = height > flat
+    return tets[solid], volume[solid]
 
 
 @compiled(error_model="numpy")
-def _turn(vertices, tets, height):  # type: ignore[no-untyped-def]
-    """Put the vertex with the shortest edges first, turn tetrahedra positive, and fill in the least height of each.
+def _turn(vertices, tets, volume, height):  # type: ignore[no-untyped-def]
+    """Put the vertex with the shortest edges first, turn tetrahedra positive, and fill in volumes and least heights.
 
     A height is three volumes over the area of a facet.
     """
@@ -88,7 +91,7 @@ def _turn(vertices, tets, height):  # type: ignore[no-untyped-def]
         nearest = tets[t, first]
         tets[t, first] = tets[t, 0]
         tets[t, 0] = nearest
-        volume, largest = 0.0, 0.0
+        largest = 0.0
         # The facets without vertex 3, 2, 1, 0; the first vertex of a facet is the nearest one where it has it.
         for without in range(3, -1, -1):
             a = tets[t, 1] if without == 0 else tets[t, 0]
@@ -103,13 +106,13 @@ def _turn(vertices, tets, height):  # type: ignore[no-untyped-def]
                 largest = squared
             if without == 3:
                 apex = tets[t, 3]
-                volume = (
+                signed = (
                     nx * (vertices[apex, 0] - x) + ny * (vertices[apex, 1] - y) + nz * (vertices[apex, 2] - z)
                 ) / 6.0
-                if volume < 0.0:
+                volume[t] = abs(signed)
+                if signed < 0.0:
                     tets[t, 1], tets[t, 2] = c, b
-                    volume = -volume
-        height[t] = 6.0 * volume / math.sqrt(largest) if largest > 0.0 else 0.0
+        height[t] = 6.0 * volume[t] / math.sqrt(largest) if largest > 0.0 else 0.0
 
 
 def faces_of_solid(balls: Balls) -> NDArray[np.int32]:

@@ -24,7 +24,7 @@ from face_plugin.errors import MeshingError
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box, Filling
 from face_plugin.faraday.meshers import CageMesh
-from face_plugin.faraday.meshers.boundary import ball_volumes, oriented, tet_volumes
+from face_plugin.faraday.meshers.boundary import ball_volumes, oriented
 
 __all__ = ["delaunay_mesh", "gmsh_loads", "tetrahedralize"]
 
@@ -86,11 +86,11 @@ def delaunay_mesh(balls: Balls, filling: Filling, box: Box, library: Library | N
     owner = np.full(len(vertices), -1, dtype=np.int32)
     owner[: count * solid] = np.repeat(np.arange(count, dtype=np.int32), solid)
     flat = FLATTEST * float((box.upper - box.lower).max())
-    tets = oriented(vertices, tetrahedralize(vertices, library), flat)
+    tets, volume = oriented(vertices, tetrahedralize(vertices, library), flat)
     first = owner[tets[:, 0]]
     inside = (first >= 0) & (owner[tets[:, 1:]] == first[:, None]).all(axis=1)
     expected = ball_volumes(balls)
-    found = np.bincount(first[inside], weights=tet_volumes(vertices, tets[inside]), minlength=count)
+    found = np.bincount(first[inside], weights=volume[inside], minlength=count)
     lost = int(np.count_nonzero(np.abs(found - expected) > BALL_TOLERANCE * expected))
     if lost:
         raise MeshingError(f"the Delaunay tetrahedra cut through {lost} of {count} balls; {ADVICE}")

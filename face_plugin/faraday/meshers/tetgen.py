@@ -75,7 +75,7 @@ def tetgen_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
     if len(made["tets"]) == 0:
         raise MeshingError(f"tetgen made no tetrahedra; {ADVICE}")
     vertices, boundary = snapped_to_box(made["vertices"].astype(np.float64), box)
-    tets = oriented(vertices, made["tets"].astype(np.int32), flat=0.0)
+    tets, _ = oriented(vertices, made["tets"].astype(np.int32), flat=0.0)
     owner = np.full(len(vertices), -1, dtype=np.int32)
     markers = made["markers"].ravel().astype(np.int32)
     faces = made["faces"].astype(np.int64)

@@ -97,7 +97,7 @@ def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
         raise MeshingError(f"tetwild made no tetrahedra; {ADVICE}")
     vertices, boundary = snapped_to_box(made["vertices"].astype(np.float64), box)
     flat = FLATTEST * float((box.upper - box.lower).max())
-    tets = oriented(vertices, made["tets"].astype(np.int32), flat)
+    tets, _ = oriented(vertices, made["tets"].astype(np.int32), flat)
     # On a face of the box, flat tetrahedra may have had vertices for themselves.
     used, place = np.unique(tets, return_inverse=True)
     vertices, boundary, tets = vertices[used], boundary[used], place.reshape(tets.shape).astype(np.int32)

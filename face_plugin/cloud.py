@@ -107,9 +107,12 @@ def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
     >>> as_points([[0, 0, 1]]).dtype
     dtype('float64')
     """
+    if _is_masked(points):
+        # NumPy would drop the mask, and what lies under it would become points.
+        raise ValueError(f"{name} must not hold masked values, found a mask: leave out its rows")
     try:
         array = np.asarray(points)
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise ValueError(f"{name} must be an (n, 3) array of numbers: {error}") from None
     if array.dtype.kind in "iub":
         array = array.astype(np.float64)
@@ -125,6 +128,12 @@ def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
         first = ", ".join(map(str, bad[:5])) + (", ..." if len(bad) > 5 else "")
         raise ValueError(f"{name} must be finite, found NaN or infinity in {len(bad)} of {len(array)} rows: {first}")
     return array
+
+
+def _is_masked(points: ArrayLike) -> bool:
+    """Whether an array, or a row of a list, has values that count as missing."""
+    rows = points if isinstance(points, (list, tuple)) else [points]
+    return any(np.ma.is_masked(row) for row in rows)
 
 
 def prepare(points: ArrayLike) -> Cloud:

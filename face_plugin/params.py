@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import numbers
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
@@ -30,7 +31,7 @@ SMALLEST_TILE = 1000
 
 @dataclass(frozen=True)
 class Params:
-    """Settings of the method; None means derived from the data.
+    """Settings of the method; None means derived from the data. NumPy's numbers are kept as Python's.
 
     Raises
     ------
@@ -113,7 +114,8 @@ class Params:
         else:
             _number(self, "alpha", 0.0, 1.0)
         for name, allowed in CHOICES.items():
-            if getattr(self, name) not in allowed:
+            # Of an array, `in` would ask for the truth.
+            if not isinstance(getattr(self, name), str) or getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {allowed}, found {getattr(self, name)!r}")
         _integer(self, "seed", 0)
         if self.tile_points is not None:
@@ -122,7 +124,7 @@ class Params:
             _number(self, "max_memory", 0.0, math.inf)
         if self.workers is not None:
             _integer(self, "workers", 1)
-        if self.engine not in ENGINES and "://" not in self.engine:
+        if not isinstance(self.engine, str) or (self.engine not in ENGINES and "://" not in self.engine):
             raise ValueError(f"engine must be one of {ENGINES} or an address, found {self.engine!r}")
 
     @classmethod
@@ -159,15 +161,21 @@ class Params:
 def _integer(params: Params, name: str, least: int) -> None:
     """Raise unless the field is an integer of at least `least`."""
     value = getattr(params, name)
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
         raise ValueError(f"{name} must be an integer >= {least}, found {value!r}")
+    object.__setattr__(params, name, int(value))
 
 
 def _number(params: Params, name: str, low: float, high: float, *, closed: bool = False, least: bool = False) -> None:
     """Raise unless the field is a number in (low, high); `closed` admits `high`, `least` admits `low`."""
     value = getattr(params, name)
     span = f"{'[' if least else '('}{low:g}, {high:g}{']' if closed else ')'}"
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, numbers.Real) else float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
         raise ValueError(f"{name} must be a finite number in {span}, found {value!r}")
-    if not (low < value < high or (least and value == low) or (closed and value == high)):
+    if not (low < number < high or (least and number == low) or (closed and number == high)):
         raise ValueError(f"{name} must be in {span}, found {value!r}")
+    object.__setattr__(params, name, number)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import logging
+import threading
 from collections.abc import Callable
 from typing import Literal
 
@@ -11,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.errors import MissingDependencyError, require
+from face_plugin.cloud import as_points
+from face_plugin.errors import FaceError, MissingDependencyError, require
 from face_plugin.memory import GIGABYTE, available_memory
 
 __all__ = [
@@ -28,7 +30,11 @@ log = logging.getLogger(__name__)
 Backend = Literal["open3d", "pymeshlab"]
 BACKENDS: tuple[Backend, ...] = ("open3d", "pymeshlab")
 DEPTHS = (1, 16)
+# Open3D's own least depth; PyMeshLab takes 1.
+OPEN3D_LEAST = 2
 FEWEST_POINTS = 4
+# Triangles of a tetrahedron: fewer are no surface of anything.
+FEWEST_FACES = 4
 # Weight of the points in the screened variant: the value that Kazhdan and Hoppe recommend for linear
 # elements, and the default of both hosts.
 SCREENING = 4.0
@@ -45,6 +51,9 @@ PROBES = 2_000
 CELL_BYTES = 1.5e3
 DEEPER_SHARE = 0.6
 _BITS = 20
+
+# The hosts share state within a process: several reconstructions at once crash, PyMeshLab's more often than Open3D's.
+_one_at_a_time = threading.Lock()
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
 
@@ -64,7 +73,7 @@ def poisson_reconstruction(
     ----------
     points, normals : (n, 3) float
         Points in any unit, and outward unit normals.
-    depth : int, 1 to 16, or None
+    depth : int, 1 to 16 (Open3D: 2 to 16), or None
         Depth of the octree: the finest cell is 1.1 x the longest side / 2**depth (Open3D). None: from the
         spacing of the points, at most 12. A warning says when it will not fit into memory.
     screened : bool
@@ -86,6 +95,8 @@ def poisson_reconstruction(
     ------
     ValueError
         An argument is out of range.
+    FaceError
+        The surface is empty: at this depth, or of these points, the host makes none.
     MissingDependencyError
         No host is installed; with the line to install one.
 
@@ -98,19 +109,30 @@ def poisson_reconstruction(
     (3, 3)
     """
     backend = check_arguments(depth, backend, trim)
+    points, normals = as_points(points), as_points(normals, "normals")
+    if len(normals) != len(points):
+        raise ValueError(f"normals must be as many as points, found {len(normals)} for {len(points)}")
     if len(points) < FEWEST_POINTS:
         raise ValueError(f"points must hold at least {FEWEST_POINTS} points to reconstruct from, found {len(points)}")
     # Hosts work partly in single precision: reconstruct near the origin and at unit size.
     origin = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
     size = float(np.ptp(points, axis=0).max())
+    if size == 0.0:
+        raise ValueError(f"points must be distinct, found {len(points)} points at one place")
     local = (points.astype(np.float64) - origin) / size
     if depth is None:
         depth = suggested_depth(local)
     warn_if_too_large(local, depth)
     run = _open3d if backend == "open3d" else _pymeshlab
     vertices, faces, densities = _closed(run, local, normals.astype(np.float64), int(depth), SCREENING * screened)
-    if trim > 0 and densities is not None:
+    if trim > 0 and densities is not None and len(densities):
         vertices, faces, densities = _trimmed(vertices, faces, densities, trim)
+    if len(faces) < FEWEST_FACES:
+        less = f", less trim than {trim:g}" if trim > 0 else ""
+        raise FaceError(
+            f"the surface is empty: try a deeper octree than depth={depth}{less} or more points; found {len(faces)} "
+            f"triangles from {len(points)} points"
+        )
     return vertices * size + origin, faces, densities
 
 
@@ -125,12 +147,14 @@ def check_arguments(depth: int | None, backend: Backend | None, trim: float) -> 
     whole = isinstance(depth, (int, np.integer)) and not isinstance(depth, bool)
     if depth is not None and (not whole or not DEPTHS[0] <= depth <= DEPTHS[1]):
         raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
-    if not 0.0 <= trim < 1.0:
+    if isinstance(trim, (str, bytes)) or not np.isscalar(trim) or not 0.0 <= trim < 1.0:
         raise ValueError(f"trim must be in [0, 1), found {trim!r}")
     if backend is None:
         backend = _installed()
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {BACKENDS} or None, found {backend!r}")
+    if backend == "open3d" and depth is not None and depth < OPEN3D_LEAST:
+        raise ValueError(f"depth must be an integer from {OPEN3D_LEAST} to {DEPTHS[1]} with Open3D, found {depth!r}")
     if trim > 0 and backend != "open3d":
         raise ValueError(f"trim needs the backend 'open3d', which gives densities; found {backend!r}")
     return backend
@@ -153,11 +177,16 @@ def _closed(
 
     That of a sheet is closed in none, and is then that of the first.
     """
-    made = [run(points, normals, depth, weight, SCALES[0])]
+
+    def made_in(scale: float) -> Mesh:
+        with _one_at_a_time:
+            return run(points, normals, depth, weight, scale)
+
+    made = [made_in(SCALES[0])]
     for scale in SCALES[1:]:
         if is_closed(made[-1][1]):
             return made[-1]
-        made.append(run(points, normals, depth, weight, scale))
+        made.append(made_in(scale))
     return made[-1] if is_closed(made[-1][1]) else made[0]
 
 

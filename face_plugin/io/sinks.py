@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import require
+from face_plugin.io.disk import allocated
 from face_plugin.io.las import LAS_NORMAL, colour_16_bit, new_las
 from face_plugin.io.names import COLOUR, NORMAL, POINT
 from face_plugin.io.plydata import PlyData
@@ -34,7 +35,7 @@ def _npy(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
         block = np.stack([part[name] for name in names if part[name].dtype.kind in "fiub"], axis=1)
         if out is None:
             shape = (count, block.shape[1])
-            out = np.lib.format.open_memmap(path, "w+", dtype=block.dtype, shape=shape)
+            out = allocated(path, block.dtype, shape)
         out[seen : seen + len(block)] = block
         seen += len(block)
     if out is None:

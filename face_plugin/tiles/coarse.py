@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.solve import solve_cage
+from face_plugin.io.disk import naming
 from face_plugin.params import Params
 
 __all__ = ["Coarse", "Voxels", "nearest_to_centres", "solve_coarse", "voxel_size"]
@@ -133,7 +134,9 @@ class Coarse:
     def save(self, folder: Path) -> None:
         """Write what `load` reads."""
         arrays = {f.name: getattr(self.mesh, f.name) for f in dataclasses.fields(CageMesh)}
-        np.savez(folder / "coarse.npz", potential=self.potential, cage_value=self.cage_value, **arrays)
+        path = folder / "coarse.npz"
+        with naming(path):
+            np.savez(path, potential=self.potential, cage_value=self.cage_value, **arrays)
 
     @classmethod
     def load(cls, folder: Path) -> Coarse:

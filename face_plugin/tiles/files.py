@@ -6,6 +6,7 @@ import logging
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.io.cloudfile import replacing
+from face_plugin.io.disk import claimed
 from face_plugin.io.sinks import WRITERS, Columns
 from face_plugin.io.sources import STREAMED, Source, open_source
 from face_plugin.params import Params
@@ -112,7 +114,7 @@ def normals_of_file(
         A file that cannot be read or written in parts; or, with `resume`, work on another input or with
         other settings.
     OSError
-        A file cannot be opened or written.
+        A file cannot be opened or written, or another run is writing the output (`BlockingIOError`).
 
     Examples
     --------
@@ -131,42 +133,52 @@ def normals_of_file(
     opened = open_source(source)
     chunk = int(np.clip(allowed_memory(params) / 4 / PART_BYTES, *PART_POINTS))
     folder = work_folder(output)
-    if folder.exists() and not resume:
-        shutil.rmtree(folder)
-    folder.mkdir(exist_ok=True)
     interior = filter_interior or mark_interior
-    try:
+    with _working(folder, output, resume):
         store, timings = solve_store(
             folder, opened, params, classify=interior, engine=engine, resume=resume, progress=progress, chunk=chunk
         )
         report("write", 0.0)
         found = collect(store, folder)
-        inside = found["interior"] if interior else None
-        written = opened.count
-        if filter_interior and inside is not None:
-            written -= int(np.count_nonzero(inside))
+        inside = int(np.count_nonzero(found["interior"])) if interior else None
+        written = opened.count - (inside or 0 if filter_interior else 0)
         extra = [name for name, wanted in _extras(scalars, mark_interior) if wanted]
         parts = columns_of(opened, found, extra, drop_interior=filter_interior, chunk=chunk)
         with replacing(output) as temporary:
             WRITERS[output.suffix.lower()](temporary, written, parts, opened)
+        mean_confidence = float(found["confidence"].mean())
         report("write", 1.0)
-    except BaseException:
-        if (folder / "store.json").exists():
-            log.warning("what was done is kept in %s for --resume", folder)
-        else:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
-    result = FileResult(
+        # The folder can be removed where nothing in it is mapped any more.
+        del found, parts
+    return FileResult(
         points=opened.count,
         written=written,
-        interior=None if inside is None else int(np.count_nonzero(inside)),
-        mean_confidence=float(found["confidence"].mean()),
+        interior=inside,
+        mean_confidence=mean_confidence,
         timings=timings,
         params=params,
     )
-    del found, inside, parts
-    shutil.rmtree(folder)
-    return result
+
+
+@contextmanager
+def _working(folder: Path, output: Path, resume: bool) -> Iterator[None]:
+    """Have a folder to work in, alone; it stays where a run that fails has left something to go on from."""
+    with claimed(folder.with_name(f"{folder.name}.lock"), output):
+        if folder.exists() and not resume:
+            shutil.rmtree(folder)
+        try:
+            folder.mkdir(exist_ok=True)
+            yield
+        except BaseException as error:
+            if (folder / "store.json").exists():
+                log.warning("what was done is kept in %s for --resume", folder)
+            else:
+                shutil.rmtree(folder, ignore_errors=True)
+            if isinstance(error, OSError) and folder in [Path(str(error.filename)), *Path(str(error.filename)).parents]:
+                # Of what is in there nobody has heard.
+                raise OSError(error.errno, error.strerror, str(output)) from error
+            raise
+        shutil.rmtree(folder)
 
 
 def _extras(scalars: bool, mark_interior: bool) -> list[tuple[str, bool]]:

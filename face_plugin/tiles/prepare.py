@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from face_plugin import cloud
 from face_plugin.cloud import Frame
+from face_plugin.io.disk import allocated
 from face_plugin.io.sources import CHUNK, Source
 from face_plugin.params import Params
 from face_plugin.tiles.coarse import VOXELS_PER_POINT, Voxels, voxel_size
@@ -106,7 +107,7 @@ def fill_store(
     start = np.concatenate([[0], np.cumsum(count)])
     dtype = cloud.as_points(np.empty((0, 3), source.dtype)).dtype
     store = Store(folder, params, frame, start, bounds, dtype, interior, key, size, plane)
-    np.savez(folder / "voxels.npz", points=voxels.points, tile=partition.assign(voxels.points))
+    store.write_whole("voxels", points=voxels.points, tile=partition.assign(voxels.points))
     _place(store, source, partition, chunk)
     progress(1.0)
     log.info("%d points in %d tiles", store.count, store.tiles)
@@ -159,8 +160,8 @@ def _count(
 
 def _place(store: Store, source: Source, partition: Partition, chunk: int) -> None:
     """Write the points sorted by tile, and where each came from."""
-    points_out = np.lib.format.open_memmap(store.folder / "points.npy", "w+", dtype=np.float64, shape=(store.count, 3))
-    rows_out = np.lib.format.open_memmap(store.folder / "rows.npy", "w+", dtype=np.int64, shape=(store.count,))
+    points_out = allocated(store.folder / "points.npy", np.float64, (store.count, 3))
+    rows_out = allocated(store.folder / "rows.npy", np.int64, (store.count,))
     fill, seen = store.start[:-1].copy(), 0
     for points in _in_frame(source, store.frame, chunk):
         tile = partition.assign(points)
@@ -172,5 +173,6 @@ def _place(store: Store, source: Source, partition: Partition, chunk: int) -> No
         rows_out[place] = seen + order
         fill += count
         seen += len(points)
+    # Workers on other machines must find it.
     points_out.flush()
     rows_out.flush()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
+from face_plugin.io.disk import allocated
 from face_plugin.io.sources import CHUNK, ArraySource, Source
 from face_plugin.params import Params
 from face_plugin.result import Result
@@ -211,7 +212,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         dtype, shape = kinds[name]
         if folder is None:
             return np.empty(shape, dtype)
-        return np.lib.format.open_memmap(folder / f"{name}.npy", "w+", dtype=dtype, shape=shape)
+        return allocated(folder / f"{name}.npy", dtype, shape)
 
     out = {name: empty(name) for name in kinds}
     rows = store.rows()

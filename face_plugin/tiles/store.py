@@ -10,6 +10,9 @@ from __future__ import annotations
 import json
 import os
 import secrets
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.cloud import Frame
+from face_plugin.io.disk import naming
 from face_plugin.params import Params
 
 __all__ = ["Store", "Subset"]
@@ -107,8 +111,9 @@ class Store:
             }
         )
         temporary = self.folder / f"store.{secrets.token_hex(4)}.tmp"
-        temporary.write_text(text)
-        os.replace(temporary, self.folder / "store.json")
+        with naming(self.folder / "store.json"):
+            temporary.write_text(text)
+            os.replace(temporary, self.folder / "store.json")
 
     @classmethod
     def load(cls, folder: Path) -> Store:
@@ -119,11 +124,15 @@ class Store:
         FileNotFoundError
             There is none, or it was never finished.
         ValueError
-            It was made by another version.
+            It was made by another version, or is damaged.
         """
-        text = json.loads((folder / "store.json").read_text())
+        with _undamaged(folder / "store.json"):
+            return cls._of(folder, json.loads((folder / "store.json").read_text()))
+
+    @classmethod
+    def _of(cls, folder: Path, text: Any) -> Store:
         if text["version"] != VERSION:
-            raise ValueError(f"{folder}: a store of version {text['version']}, this package reads {VERSION}")
+            raise ValueError(f"a store of version {text['version']}, this package reads {VERSION}")
         frame = Frame(np.array(text["origin"]), np.array(text["rotation"]), text["scale"])
         return cls(
             folder=folder,
@@ -147,11 +156,12 @@ class Store:
         return self._map("rows.npy", mode)
 
     def _map(self, name: str, mode: Any) -> NDArray[Any]:
-        return np.asanyarray(np.load(self.folder / name, mmap_mode=mode))
+        with _undamaged(self.folder / name):
+            return np.asanyarray(np.load(self.folder / name, mmap_mode=mode))
 
     def voxels(self, tile: int) -> NDArray[np.float64]:
         """Points (k, 3) of the coarse level that a tile owns."""
-        with np.load(self.folder / "voxels.npz") as arrays:
+        with _undamaged(self.folder / "voxels.npz"), np.load(self.folder / "voxels.npz") as arrays:
             return np.asarray(arrays["points"][arrays["tile"] == tile])
 
     def tile_points(self, tile: int) -> NDArray[np.float64]:
@@ -188,13 +198,23 @@ class Store:
         """Write arrays to a file of the store, whole or not at all."""
         temporary = self.folder / f"{name}.{secrets.token_hex(4)}.tmp"
         try:
-            with open(temporary, "wb") as stream:
-                np.savez(stream, allow_pickle=False, **arrays)
-            os.replace(temporary, self.folder / f"{name}.npz")
+            with naming(self.folder / f"{name}.npz"):
+                with open(temporary, "wb") as stream:
+                    np.savez(stream, allow_pickle=False, **arrays)
+                os.replace(temporary, self.folder / f"{name}.npz")
         finally:
             temporary.unlink(missing_ok=True)
 
     def read(self, tile: int, stage: str, *names: str) -> dict[str, NDArray[Any]]:
         """Read it back: what is named, or all of it."""
-        with np.load(self.path(tile, stage)) as arrays:
+        with _undamaged(self.path(tile, stage)), np.load(self.path(tile, stage)) as arrays:
             return {name: arrays[name] for name in names or arrays.files}
+
+
+@contextmanager
+def _undamaged(path: Path) -> Iterator[None]:
+    """Say of a file of a store that cannot be read which one it is: a folder to go on from is input like any other."""
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path}: nothing to go on from ({error}): remove {path.parent}, or do not resume") from error

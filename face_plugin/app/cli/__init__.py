@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-import argparse
-import signal
-import threading
-import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from importlib import import_module
-from types import FrameType
+import sys
+from typing import TYPE_CHECKING
 
-from face_plugin import __version__
-from face_plugin.app.cli.console import Console, guarded_stdout
-from face_plugin.errors import FaceError, MissingDependencyError
+# Everything else is imported once `main` listens to signals.
+from face_plugin.app.cli.signals import STOPPED, listening
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
+    from face_plugin.app.cli.console import Console
 
 __all__ = ["build_parser", "main"]
 
 COMMANDS = ("normals", "mesh", "ribbons", "info", "plot", "view", "chain", "script")
 
-FAILED, BAD_INPUT, MISSING, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
+FAILED, BAD_INPUT, MISSING = 1, 2, 3
 EXIT_CODES = """exit codes:
   0    done
   1    the method failed on this input
-  2    bad usage or bad input: an unknown option, an unreadable or malformed file, a value out of range
+  2    bad usage or bad input: an unknown option, an unreadable or malformed file, a value out of range; or no place to
+       write to: a full disk, a closed or full standard output, another run writing the same file
   3    an optional package is missing; the message says how to install it
   130  interrupted (Ctrl-C); no half-written file is left
+  143  terminated (SIGTERM), likewise
 """
 
 
@@ -37,6 +38,11 @@ def build_parser() -> argparse.ArgumentParser:
     >>> build_parser().parse_args(["mesh", "in.ply", "-o", "out.ply"]).command
     'mesh'
     """
+    import argparse
+    from importlib import import_module
+
+    from face_plugin import __version__
+
     parser = argparse.ArgumentParser(
         prog="face",
         description="Outward normals and closed surfaces of unoriented points, by Faraday cage estimation.",
@@ -58,64 +64,75 @@ def main(argv: Sequence[str] | None = None) -> int:
     >>> main(["info", "no-such-file.ply", "--quiet"])
     2
     """
-    try:
-        args = build_parser().parse_args(argv)
-        with (
-            guarded_stdout() as write,
-            _sigterm_raises(),
-            Console(args.command, args.verbose, args.quiet, args.json, write) as console,
-        ):
-            return _run(args, console)
-    except SystemExit as stop:
-        # argparse has said what was wrong (2), or printed its help or version (0).
-        return stop.code if isinstance(stop.code, int) else BAD_INPUT
-    except KeyboardInterrupt:
-        # Before the run began, or for the second time.
-        return INTERRUPTED
+    with listening() as heard:
+        try:
+            return _main(argv, heard)
+        except BaseException:
+            # Before the run began, or for the second time.
+            if not heard:
+                raise
+            message, code = STOPPED[heard[0]]
+            if sys.stderr is not None:
+                sys.stderr.write(f"face: error: {message}\n")
+            return code
 
 
-def _run(args: argparse.Namespace, console: Console) -> int:
+def _main(argv: Sequence[str] | None, heard: list[int]) -> int:
+    """Parse the arguments and run the command, whatever the standard streams are like."""
+    from contextlib import redirect_stderr
+    from typing import TextIO, cast
+
+    from face_plugin.app.cli.console import Console
+    from face_plugin.app.cli.streams import Unfailing, fill_closed, guarded_stdout, settle_stdout
+
+    fill_closed()
+    with redirect_stderr(cast(TextIO, Unfailing(sys.stderr))):
+        try:
+            try:
+                args = build_parser().parse_args(argv)
+            except SystemExit as stop:
+                # argparse has said what was wrong (2), or printed its help or version (0).
+                settle_stdout()
+                return stop.code if isinstance(stop.code, int) else BAD_INPUT
+            with (
+                guarded_stdout() as write,
+                Console(args.command, args.verbose, args.quiet, args.json, write) as console,
+            ):
+                return _run(args, console, heard)
+        except OSError as error:
+            if error.filename != "standard output":
+                raise
+            sys.stderr.write(f"face: error: {error.filename}: {error.strerror}\n")
+            return BAD_INPUT
+        finally:
+            sys.stderr.flush()
+
+
+def _run(args: argparse.Namespace, console: Console, heard: list[int]) -> int:
+    from face_plugin.errors import FaceError, MissingDependencyError
+
     try:
         summary, text = args.run(args, console)
         console.report(summary, text)
         return 0
-    except KeyboardInterrupt:
-        return console.fail("interrupted", INTERRUPTED)
-    except _Terminated:
-        return console.fail("terminated", TERMINATED)
-    except MissingDependencyError as error:
-        return _fail(console, error, MISSING)
-    except (FaceError, MemoryError) as error:
-        return _fail(console, error, FAILED)
-    except (ValueError, OSError) as error:
-        return _fail(console, error, BAD_INPUT)
+    except BaseException as error:
+        if heard:
+            return console.fail(*STOPPED[heard[0]])
+        if isinstance(error, MissingDependencyError):
+            return _fail(console, error, MISSING)
+        if isinstance(error, (FaceError, MemoryError)):
+            return _fail(console, error, FAILED)
+        if isinstance(error, (ValueError, OSError)):
+            return _fail(console, error, BAD_INPUT)
+        raise
 
 
 def _fail(console: Console, error: BaseException, code: int) -> int:
     if console.verbose:
+        import traceback
+
         console.note(traceback.format_exc())
     message = str(error) or ("not enough memory" if isinstance(error, MemoryError) else type(error).__name__)
     if isinstance(error, OSError) and error.strerror and error.filename:
         message = f"{error.filename}: {error.strerror}"
     return console.fail(message, code)
-
-
-class _Terminated(BaseException):
-    """SIGTERM, as an exception: what is open is closed and temporary files are removed."""
-
-
-@contextmanager
-def _sigterm_raises() -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():
-        # Only the main thread can be told of signals.
-        yield
-        return
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        raise _Terminated
-
-    previous = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import logging
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -16,34 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from face_plugin.app.cli.bars import Bars
 
-__all__ = ["Console", "guarded_stdout"]
-
-
-@contextmanager
-def guarded_stdout() -> Iterator[Callable[[str], None]]:
-    """Send everything that native libraries print to stderr; yield the only way to write to stdout.
-
-    A C++ mesher that prints a line would otherwise make the JSON on stdout unreadable.
-    """
-    sys.stdout.flush()
-    real = os.dup(1)
-    os.dup2(2, 1)
-    written: list[str] = []
-    try:
-        yield written.append
-    finally:
-        sys.stdout.flush()
-        if os.name == "posix":
-            # C keeps its own buffer, which must be emptied before stdout is itself again.
-            ctypes.CDLL(None).fflush(None)
-        os.dup2(real, 1)
-        os.close(real)
-        try:
-            sys.stdout.write("".join(written))
-            sys.stdout.flush()
-        except BrokenPipeError:
-            # The reader (`head`, say) has seen enough. Python would complain again when it closes stdout.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+__all__ = ["Console"]
 
 
 class Console:

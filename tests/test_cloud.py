@@ -173,3 +173,14 @@ def test_morton_order_keeps_neighbours_together():
     np.testing.assert_array_equal(np.sort(order), np.arange(4096))
     # The mean step between points at random is 0.66, the spacing 1/16. Measured along the curve: 0.082.
     assert np.linalg.norm(np.diff(points[order], axis=0), axis=1).mean() < 0.1
+
+
+@pytest.mark.parametrize("rows", [False, True], ids=["array", "list of rows"])
+def test_masked_values_are_refused(rows):
+    """NumPy drops a mask without a word; what lies under it, such as a reader's -9999, is no point."""
+    points = np.random.default_rng(0).random((20, 3))
+    points[:3] = -9999
+    masked = np.ma.masked_values(points, -9999)
+    with pytest.raises(ValueError, match="points must not hold masked values, found a mask"):
+        cloud.prepare(list(masked) if rows else masked)
+    assert cloud.prepare(masked[3:]).size == 17

@@ -16,7 +16,7 @@ NUMBERS = {
     "finest": ([0.5, 1.5, 10.0], [0.0, -1.0, 10.5]),
     "alpha": ([0.01, 0.5], [0.0, 1.0, -0.1, 1.5]),
 }
-NOT_NUMBERS = [math.nan, math.inf, -math.inf, True, "0.1", [0.1], 1j]
+NOT_NUMBERS = [math.nan, math.inf, -math.inf, 10**400, True, np.True_, "0.1", [0.1], np.array([0.1, 0.2]), 1j]
 
 
 @pytest.mark.parametrize("name", NUMBERS)
@@ -33,7 +33,7 @@ def test_numbers(name):
 def test_choices(name):
     for value in CHOICES[name]:
         assert getattr(Params(**{name: value}), name) == value
-    for value in ("", "no such thing", None, 1):
+    for value in ("", "no such thing", None, 1, b"auto", [], np.array(CHOICES[name]), {}):
         with pytest.raises(ValueError, match=rf"^{name} must be one of"):
             Params(**{name: value})
 
@@ -44,8 +44,20 @@ def test_seed(value):
         Params(seed=value)
 
 
+@pytest.mark.parametrize("value", ["", "q", None, 5, b"auto", ["auto"], np.array(["auto", "serial"])])
+def test_engine(value):
+    with pytest.raises(ValueError, match=r"^engine must be one of .* or an address, found"):
+        Params(engine=value)
+
+
 def test_numpy_scalars_serve_as_numbers():
-    assert Params(ball_radius=np.float64(0.3)).ball_radius == 0.3
+    params = Params(ball_radius=np.float32(0.25), padding=np.int8(2), seed=np.uint64(2**63), tile_points=np.int64(2000))
+    assert (params.ball_radius, params.padding, params.seed, params.tile_points) == (0.25, 2, 2**63, 2000)
+    # As Python's own numbers: those go through JSON.
+    assert Params(**json.loads(json.dumps(params.to_dict()))) == params
+    for name in ("seed", "tile_points", "workers"):
+        with pytest.raises(ValueError, match=rf"^{name} must be an integer"):
+            Params(**{name: np.float64(2000)})
 
 
 def test_names_of_alpha():

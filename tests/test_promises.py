@@ -146,3 +146,12 @@ def test_seed_moves_the_mesh_but_not_the_sides():
     assert not np.array_equal(found[0], found[1])
     for normals in found:
         assert (np.einsum("ij,ij->i", normals, torus.normals) > 0).all()
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+def test_clusters_of_very_different_scale(seed):
+    """A fit whose neighbours are of another scale cannot be, and is left out."""
+    generator = np.random.default_rng(seed)
+    clusters = [generator.random(3) + 10.0**-k * generator.normal(size=(75, 3)) for k in (1, 7, 8, 10)]
+    normals = estimate_normals(np.concatenate(clusters)).normals
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)

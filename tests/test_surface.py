@@ -1,4 +1,6 @@
 import importlib.util
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -6,6 +8,8 @@ from scipy.spatial import cKDTree
 from tet_meshes import enclosed_volume, open_edges
 
 from face_plugin import MissingDependencyError, reconstruct, shapes, surface
+from face_plugin.app.cli import main
+from face_plugin.errors import FaceError
 from face_plugin.surface import poisson_reconstruction
 
 INSTALLED = [name for name in surface.BACKENDS if importlib.util.find_spec(name)]
@@ -104,12 +108,18 @@ def test_trim_drops_the_vertices_of_lowest_density():
         ({"trim": -0.1}, "trim must be in"),
         ({"trim": float("nan")}, "trim must be in"),
         ({"backend": "cgal"}, "backend must be one of .*found 'cgal'"),
+        ({"trim": "0.1"}, "trim must be in"),
+        ({"trim": np.array([0.1, 0.2])}, "trim must be in"),
+        ({"depth": 1, "backend": "open3d"}, "depth must be an integer from 2 to 16 with Open3D, found 1"),
+        ({"normals": BALL.normals[1:]}, f"normals must be as many as points, found {len(BALL.points) - 1} for"),
+        ({"points": np.ones((5, 3)), "normals": np.ones((5, 3))}, "points must be distinct, found 5 points at one"),
+        ({"points": np.full(BALL.points.shape, np.nan)}, "points must be finite"),
         ({"backend": "pymeshlab", "trim": 0.1}, "trim needs the backend 'open3d'"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
     with pytest.raises(ValueError, match=message):
-        poisson_reconstruction(BALL.points, BALL.normals, **change)
+        poisson_reconstruction(**{"points": BALL.points, "normals": BALL.normals, **change})
 
 
 def test_too_few_points_are_named():
@@ -178,3 +188,42 @@ def test_a_surface_that_bulges_over_a_gap_is_closed(backend):
     kept = ball.points[:, 2] < 0.5
     _, faces, _ = poisson_reconstruction(ball.points[kept], ball.normals[kept], depth=6, backend=backend)
     assert open_edges(faces) == 0
+
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+
+
+@pytest.mark.parametrize(("backend", "depth", "trim"), [("open3d", 2, 0.0), ("open3d", 2, 0.1), ("pymeshlab", 3, 0.0)])
+def test_an_empty_surface_is_an_error(backend, depth, trim):
+    with pytest.raises(FaceError, match=rf"the surface is empty: try a deeper octree than depth={depth}.*found 0 tri"):
+        reconstruct(CORNERS, depth=depth, trim=trim, backend=backend)
+
+
+def test_an_empty_surface_does_not_take_the_place_of_a_good_one(tmp_path, capfd):
+    np.save(tmp_path / "corners.npy", CORNERS)
+    (tmp_path / "good.ply").write_text("a good one")
+    words = ["mesh", str(tmp_path / "corners.npy"), "-o", str(tmp_path / "good.ply"), "--depth", "2", "--quiet"]
+    assert main([*words, "--backend", "open3d"]) == 1
+    assert "the surface is empty" in capfd.readouterr().err
+    assert (tmp_path / "good.ply").read_text() == "a good one"
+
+
+def test_threads_reconstruct_as_one_does():
+    """Several at once would end the process, so another is asked."""
+    program = """
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from face_plugin import shapes
+from face_plugin.surface import poisson_reconstruction
+
+def made(k):
+    ball = shapes.sphere(300, k % 3)
+    return poisson_reconstruction(ball.points, ball.normals, depth=4, backend=("open3d", "pymeshlab")[k % 2])[0]
+
+expected = [made(k) for k in range(6)]
+with ThreadPoolExecutor(6) as threads:
+    found = list(threads.map(made, [*range(6)] * 4))
+assert all(np.array_equal(a, b) for a, b in zip(found, expected * 4))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -147,7 +147,7 @@ def check_arguments(depth: int | None, backend: Backend | None, trim: float) -> 
     whole = isinstance(depth, (int, np.integer)) and not isinstance(depth, bool)
     if depth is not None and (not whole or not DEPTHS[0] <= depth <= DEPTHS[1]):
         raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
-    if isinstance(trim, (str, bytes)) or not np.isscalar(trim) or not 0.0 <= trim < 1.0:
+    if not isinstance(trim, (int, float, np.number)) or not 0.0 <= trim < 1.0:
         raise ValueError(f"trim must be in [0, 1), found {trim!r}")
     if backend is None:
         backend = _installed()

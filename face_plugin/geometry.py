@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.compiled import compiled
+from face_plugin.threads import KDTree
 
-__all__ = ["in_threads", "local_spacing", "log_ramp", "plane_fit", "ramp", "thin", "unit"]
+__all__ = ["local_spacing", "log_ramp", "plane_fit", "ramp", "thin", "unit"]
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -38,7 +35,7 @@ def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[n
     array([1., 1., 1.])
     """
     k = min(neighbours, len(points) - 1)
-    distance, _ = cKDTree(points).query(points, k=k + 1, workers=-1)
+    distance, _ = KDTree(points).query(points, k=k + 1)
     return np.asarray(distance[:, 1:].mean(axis=1))
 
 
@@ -62,8 +59,8 @@ def plane_fit(
     Examples
     --------
     >>> flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    >>> from scipy.spatial import cKDTree
-    >>> abs(plane_fit(flat, *cKDTree(flat).query(flat, k=4), count=3, width=1.0)[0]).round(6)
+    >>> from face_plugin.threads import KDTree
+    >>> abs(plane_fit(flat, *KDTree(flat).query(flat, k=4), count=3, width=1.0)[0]).round(6)
     array([0., 0., 1.])
     """
     distance, neighbour = distance[:, : count + 1], neighbour[:, : count + 1]
@@ -96,18 +93,6 @@ def log_ramp(strength: NDArray[np.float64], ends: Sequence[float]) -> NDArray[np
     array([0. , 0.5, 1. ])
     """
     return ramp(np.log(np.maximum(strength, 1e-9)), np.log(ends))
-
-
-def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> None:
-    """Call ``run(slice)`` for pieces of `count` rows on all cores; a row is computed alone, so any split is equal.
-
-    A core gets at least `least` rows.
-    """
-    pieces = max(1, min(os.cpu_count() or 1, count // least))
-    bounds = np.linspace(0, count, 4 * pieces + 1).astype(int)
-    slices = [slice(a, b) for a, b in itertools.pairwise(bounds)]
-    with ThreadPoolExecutor(pieces) as pool:
-        list(pool.map(run, slices))
 
 
 def thin(
@@ -148,12 +133,12 @@ def thin(
     if found is not None and (found[0].shape[1] == len(points) or (found[0][:, -1] > within).all()):
         _greedy_among(order, within, np.ascontiguousarray(found[0]), np.ascontiguousarray(found[1]), taken)
         return np.flatnonzero(taken)
-    tree = cKDTree(points)
-    nearest = tree.query(points, k=2, workers=-1)[0][:, 1]
+    tree = KDTree(points)
+    nearest = tree.query(points, k=2)[0][:, 1]
     crowded = np.flatnonzero(nearest < separation)
     if len(crowded) == 0:
         return np.arange(len(points))
-    lists = tree.query_ball_point(points[crowded], within[crowded], workers=-1)
+    lists = tree.query_ball_point(points[crowded], within[crowded])
     length = np.fromiter((len(x) for x in lists), dtype=np.int64, count=len(lists))
     start = np.zeros(len(points) + 1, dtype=np.int64)
     start[crowded + 1] = length

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from face_plugin.threads import KDTree
 from face_plugin.winding import DipoleTree
 
 __all__ = ["Neighbourhood"]
@@ -39,7 +39,7 @@ class Neighbourhood:
 
     @cached_property
     def _found(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        found = cKDTree(self.points).query(self.points, k=min(NEIGHBOURS + 1, len(self.points)), workers=-1)
+        found = KDTree(self.points).query(self.points, k=min(NEIGHBOURS + 1, len(self.points)))
         return np.asarray(found[0]), np.asarray(found[1])
 
     @property

@@ -10,11 +10,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.cloud import as_points
 from face_plugin.errors import FaceError, MissingDependencyError, require
 from face_plugin.memory import GIGABYTE, available_memory
+from face_plugin.threads import KDTree
 
 __all__ = [
     "Backend",
@@ -257,7 +257,7 @@ def suggested_depth(points: NDArray[np.floating]) -> int:
 def _resolved_depth(points: NDArray[np.floating]) -> float:
     """Depth, as a real number, at which a cell is as wide as the median distance to the 6 nearest."""
     probes = points[:: max(1, len(points) // PROBES)]
-    distance = cKDTree(points).query(probes, k=min(7, len(points)), workers=-1)[0]
+    distance = KDTree(points).query(probes, k=min(7, len(points)))[0]
     spacing = float(np.median(distance[:, 1:].mean(axis=1)))
     longest = float(np.ptp(points, axis=0).max())
     return float(np.log2(SCALES[0] * longest / spacing)) if spacing > 0 else float(SUGGESTED[1])

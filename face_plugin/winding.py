@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.compiled import compiled
-from face_plugin.geometry import in_threads
+from face_plugin.threads import in_threads
 
 __all__ = ["DipoleTree"]
 

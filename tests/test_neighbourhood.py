@@ -35,7 +35,7 @@ def test_a_cloud_is_searched_once_for_all_steps(monkeypatch):
             planted.append(len(points))
             super().__init__(points, areas)
 
-    monkeypatch.setattr(neighbourhood, "cKDTree", Tree)
+    monkeypatch.setattr(neighbourhood, "KDTree", Tree)
     monkeypatch.setattr(neighbourhood, "DipoleTree", Dipoles)
     FaCE(BALL.points).result(filter_interior=True)
     # The second search is among the few points that show sheets far away.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from face_plugin.angles.fits import SIZES, LocalFits
 from face_plugin.compiled import compiled
-from face_plugin.geometry import in_threads
+from face_plugin.threads import in_threads
 
 __all__ = ["find_noise", "on_lattice"]
 

@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+
+from face_plugin.threads import KDTree
 
 __all__ = ["SOLIDS", "Balls", "build_balls"]
 
@@ -76,7 +77,7 @@ def build_balls(
     if len(rows) < 2:
         raise ValueError(f"cage_spacing must leave at least 2 balls, found {len(rows)} for {len(points)} points")
     centres = points[rows]
-    nearest = cKDTree(centres).query(centres, k=2, workers=-1)[0][:, 1]
+    nearest = KDTree(centres).query(centres, k=2)[0][:, 1]
     radii = radius * nearest
     turns = _random_rotations(len(rows), seed)
     vertices = centres[:, None] + radii[:, None, None] * np.einsum("sj,bij->bsi", SOLIDS[solid], turns)

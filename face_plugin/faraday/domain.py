@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.errors import MeshingError
 from face_plugin.faraday.balls import Balls
+from face_plugin.threads import KDTree
 
 __all__ = ["Box", "Filling", "fill", "padded_box"]
 
@@ -104,7 +104,7 @@ def fill(
     >>> filling.outer.shape[1]
     3
     """
-    tree = cKDTree(balls.centres)
+    tree = KDTree(balls.centres)
     side = box.upper - box.lower
     cells = np.maximum(np.round(side / (side.max() / box.cells)), 1).astype(np.int64)
     cell = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -115,7 +115,7 @@ def fill(
     for level in range(MAXIMUM_LEVEL):
         size = side / (cells << level)
         centre = box.lower + (cell + 0.5) * size
-        distance, nearest = tree.query(centre, workers=-1)
+        distance, nearest = tree.query(centre)
         split = size.max() > np.maximum(grading * distance, finest * spacing[nearest])
         cells_so_far += np.count_nonzero(~split)
         if cells_so_far + 8 * np.count_nonzero(split) > most:
@@ -126,7 +126,7 @@ def fill(
             )
         leaf, leaf_cell = centre[~split], cell[~split]
         jittered = leaf + rng.uniform(-JITTER, JITTER, leaf.shape) * size
-        near, ball = tree.query(jittered, workers=-1)
+        near, ball = tree.query(jittered)
         inner.append(jittered[near > CLEARANCE * spacing[ball]])
         outer.append(_on_box(leaf_cell, cells << level, box))
         if not split.any():

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.field import vertex_gradients
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.geometry import unit
+from face_plugin.threads import KDTree
 
 __all__ = ["FieldAtPoints", "ball_means", "carry", "field_at_points", "field_normals"]
 
@@ -50,7 +50,7 @@ def field_at_points(
     points : (n, 3) float64
         In the frame of the mesh.
     """
-    ball = cKDTree(balls.centres).query(points, workers=-1)[1]
+    ball = KDTree(balls.centres).query(points)[1]
     normals = carry(balls.centres, field_normals(mesh, strength), points)
     return FieldAtPoints(ball_means(mesh, strength)[ball], normals)
 
@@ -93,7 +93,7 @@ def carry(
     >>> carry(np.eye(3), np.eye(3), np.array([[1.0, 0.0, 0.0]]))
     array([[1., 0., 0.]])
     """
-    distance, ball = cKDTree(centres).query(points, k=min(CARRY_NEIGHBOURS, len(centres)), workers=-1)
+    distance, ball = KDTree(centres).query(points, k=min(CARRY_NEIGHBOURS, len(centres)))
     weight = 1.0 / np.maximum(distance, 1e-300)
     weight /= weight.max(axis=1, keepdims=True)
     # Relative to the nearest: neighbours across a thin wall must not turn it around.

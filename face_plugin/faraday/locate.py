@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.compiled import compiled
 from face_plugin.faraday.gradient import ball_means
 from face_plugin.faraday.isosurface import fill_balls
 from face_plugin.faraday.meshers import CageMesh
+from face_plugin.threads import KDTree
 
 __all__ = ["Locator"]
 
@@ -56,7 +56,7 @@ class Locator:
         self._vertices, self.tets, _ = fill_balls(mesh, np.zeros(len(mesh.vertices)))
         self._start, self._incident = _incidence(self.tets, len(self._vertices))
         self._used = np.flatnonzero(np.diff(self._start))
-        self._tree = cKDTree(self._vertices[self._used])
+        self._tree = KDTree(self._vertices[self._used])
 
     def find(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Tetrahedron that contains each position, and the barycentric coordinates in it.
@@ -78,7 +78,7 @@ class Locator:
         # The nearest vertex first; the walks that do not end from there start again at its neighbours.
         todo = inside
         for neighbour in (1, 2, 5):
-            nearest = self._used[self._tree.query(points[todo], k=[neighbour], workers=-1)[1][:, 0]]
+            nearest = self._used[self._tree.query(points[todo], k=[neighbour])[1][:, 0]]
             tet[todo], weights[todo] = _walk(
                 points[todo], self._vertices, self.tets, nearest, self._start, self._incident
             )

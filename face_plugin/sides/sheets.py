@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.compiled import compiled
 from face_plugin.geometry import plane_fit, ramp, thin
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.threads import KDTree
 
 __all__ = ["Sheets", "back_to_back", "bulk", "cage_separation", "find_sheets", "next_sheet"]
 
@@ -61,7 +61,7 @@ def bulk(points: NDArray[np.float64], neighbour: NDArray[np.intp]) -> NDArray[np
     --------
     >>> x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
     >>> sheet = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
-    >>> float(bulk(sheet, cKDTree(sheet).query(sheet, k=13)[1]).max())
+    >>> float(bulk(sheet, KDTree(sheet).query(sheet, k=13)[1]).max())
     0.0
     """
     near = points[neighbour[:, : BULK_NEIGHBOURS + 1]]
@@ -163,7 +163,7 @@ def find_sheets(around: Neighbourhood) -> Sheets:
     if len(few) > BULK_NEIGHBOURS:
         wide = Neighbourhood(few)
         beyond = next_sheet(few, wide.distance, wide.neighbour, wide.spacing)
-        beyond = beyond[cKDTree(few).query(points, workers=-1)[1]]
+        beyond = beyond[KDTree(few).query(points)[1]]
         # What was found among the neighbours is nearer than anything that lies beyond them.
         far = np.where(near < distance[:, -1], near, np.maximum(near, beyond))
     return Sheets(near, far, bulk(points, around.neighbour))
@@ -203,7 +203,7 @@ def cage_separation(
     if len(points) < FEWEST:
         return np.zeros(len(points)), None
     if not coarsen:
-        return DUPLICATE * cKDTree(points).query(points, k=[9], workers=-1)[0][:, 0], None
+        return DUPLICATE * KDTree(points).query(points, k=[9])[0][:, 0], None
     sheets = find_sheets(around)
     # A point is as exposed to another sheet, and as little on one itself, as its surroundings are.
     near = around.neighbour[:, : CAGE_AROUND + 1]

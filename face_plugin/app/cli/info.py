@@ -6,11 +6,11 @@ import argparse
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command
 from face_plugin.io import CloudFile, read_cloud
+from face_plugin.threads import KDTree
 
 __all__ = ["register"]
 
@@ -43,7 +43,7 @@ def describe(cloud: CloudFile) -> dict[str, Any]:
     spacing = None
     if len(distinct) > 1:
         probe = distinct[:: len(distinct) // SAMPLE + 1]
-        spacing = float(np.median(cKDTree(distinct).query(probe, k=2, workers=-1)[0][:, 1]))
+        spacing = float(np.median(KDTree(distinct).query(probe, k=2)[0][:, 1]))
     return {
         "points": len(cloud),
         "dtype": str(cloud.points.dtype),

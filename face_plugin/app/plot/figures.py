@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.app.plot.render import Image
 from face_plugin.app.plot.section import Section
 from face_plugin.errors import require
 from face_plugin.io import check_output
 from face_plugin.io.cloudfile import replacing
+from face_plugin.threads import KDTree
 
 __all__ = ["PLOT_SUFFIXES", "Matplotlib", "new_figure", "save_figure", "show", "spacing_of", "where"]
 
@@ -65,7 +65,7 @@ def new_figure(plt: Matplotlib, width: float, height: float, title: str) -> Any:
 
 def spacing_of(points: Array) -> float:
     """Return the median distance to the nearest other point."""
-    distances = cKDTree(points).query(points, k=2, workers=-1)[0][:, 1]
+    distances = KDTree(points).query(points, k=2)[0][:, 1]
     apart = distances[distances > 0]
     return float(np.median(apart)) if len(apart) else 1.0
 

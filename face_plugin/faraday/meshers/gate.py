@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from face_plugin.errors import MeshingError
 from face_plugin.faraday.balls import Balls
@@ -17,6 +16,7 @@ from face_plugin.faraday.domain import Box
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.meshers.boundary import ball_volumes, tet_volumes
 from face_plugin.memory import GIGABYTE
+from face_plugin.threads import KDTree
 
 __all__ = ["check_balls", "check_memory", "check_mesh"]
 
@@ -84,8 +84,8 @@ def check_balls(
 def _check_disjoint(balls: Balls, gap: float) -> None:
     if len(balls.radii) < 2:
         return
-    tree = cKDTree(balls.centres)
-    nearest = tree.query(balls.centres, k=2, workers=-1)[0][:, 1]
+    tree = KDTree(balls.centres)
+    nearest = tree.query(balls.centres, k=2)[0][:, 1]
     # Balls that all stay below half the way to their nearest neighbour are disjoint; only the others
     # need a search.
     wide = np.flatnonzero(balls.radii > 0.5 * (1 - gap) * nearest)

@@ -138,7 +138,7 @@ def thin(
     crowded = np.flatnonzero(nearest < separation)
     if len(crowded) == 0:
         return np.arange(len(points))
-    lists = tree.query_ball_point(points[crowded], within[crowded])
+    lists = tree.within(points[crowded], within[crowded])
     length = np.fromiter((len(x) for x in lists), dtype=np.int64, count=len(lists))
     start = np.zeros(len(points) + 1, dtype=np.int64)
     start[crowded + 1] = length

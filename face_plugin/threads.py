@@ -34,7 +34,7 @@ class KDTree(cKDTree):  # type: ignore[misc]
     is free again, which ends the process by a signal.
     """
 
-    def query(self, x: NDArray[np.float64], k: int | list[int] = 1) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    def query(self, x: NDArray[np.floating], k: int | list[int] = 1) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """Distances and rows of the nearest points, as of SciPy.
 
         Parameters
@@ -61,12 +61,12 @@ class KDTree(cKDTree):  # type: ignore[misc]
         in_threads(run, len(x))
         return distance, row
 
-    def query_ball_point(self, x: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[Any]:
+    def within(self, x: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[Any]:
         """Return lists (m,) of the rows within distances r (m,) of positions x (m, 3).
 
         Examples
         --------
-        >>> KDTree(np.eye(3)).query_ball_point(np.zeros((1, 3)), np.ones(1))[0]
+        >>> KDTree(np.eye(3)).within(np.zeros((1, 3)), np.ones(1))[0]
         [0, 1, 2]
         """
         lists = np.empty(len(x), dtype=object)

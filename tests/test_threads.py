@@ -26,7 +26,7 @@ def test_the_nearest_are_those_of_scipy(k):
 
 def test_those_within_a_distance_are_those_of_scipy():
     reach = np.linspace(0, 0.2, len(POINTS))
-    found = KDTree(POINTS).query_ball_point(POINTS, reach)
+    found = KDTree(POINTS).within(POINTS, reach)
     expected = cKDTree(POINTS).query_ball_point(POINTS, reach)
     assert [sorted(x) for x in found] == [sorted(x) for x in expected]
 

@@ -192,7 +192,6 @@ def _dipole_sums(  # type: ignore[no-untyped-def]
     A node is far where it is from every query of the group. Queries that are the points themselves leave themselves
     out. Sources are collected, and added a list at a time: columns of positions and dipoles, so that it vectorises.
     """
-    px, py, pz, mx, my, mz = source[0], source[1], source[2], source[3], source[4], source[5]
     for group in range(first, last):
         begin, end = group * GROUP, (group + 1) * GROUP
         if end > len(queries):
@@ -257,15 +256,15 @@ def _dipole_sums(  # type: ignore[no-untyped-def]
                 x0, y0, z0, squared = queries[i, 0], queries[i, 1], queries[i, 2], eps[i] * eps[i]
                 gx, gy, gz, w = 0.0, 0.0, 0.0, 0.0
                 for j in range(count):
-                    dx, dy, dz = px[j] - x0, py[j] - y0, pz[j] - z0
+                    dx, dy, dz = source[0, j] - x0, source[1, j] - y0, source[2, j] - z0
                     inverse = 1.0 / (dx * dx + dy * dy + dz * dz + squared)
                     cube = inverse * math.sqrt(inverse)
-                    along = (dx * mx[j] + dy * my[j] + dz * mz[j]) * cube
+                    along = (dx * source[3, j] + dy * source[4, j] + dz * source[5, j]) * cube
                     w += along
                     along *= 3.0 * inverse
-                    gx += mx[j] * cube - along * dx
-                    gy += my[j] * cube - along * dy
-                    gz += mz[j] * cube - along * dz
+                    gx += source[3, j] * cube - along * dx
+                    gy += source[4, j] * cube - along * dy
+                    gz += source[5, j] * cube - along * dz
                 out[i, 0] += gx
                 out[i, 1] += gy
                 out[i, 2] += gz

@@ -131,7 +131,7 @@ def isosurface(
     if close:
         salt = np.random.default_rng(0).integers(1 << 62, size=len(points), dtype=np.uint64) * np.uint64(2)
         faces = boundary_candidates(cells, above, _FACES, salt + np.uint64(1))
-        ends = np.concatenate([ends, march(_unpaired(faces), above, _table(_FACE_CUTS))])
+        ends = np.concatenate([ends, march(_unpaired(faces).astype(cells.dtype), above, _table(_FACE_CUTS))])
     number, distinct = number_edges(ends.reshape(-1, 2), len(points))
     a, b = distinct.T
     t = np.where(a == b, 0.0, level - field[a]) / np.where(a == b, 1.0, field[b] - field[a])

@@ -100,13 +100,16 @@ def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
 def _strength_exact(g, out):  # type: ignore[no-untyped-def]
     """Largest eigenvalue of G^T G from the trigonometric solution of its characteristic cubic."""
     for i in range(len(g)):
-        # Scalars throughout, as above.
-        m00 = g[i, 0, 0] * g[i, 0, 0] + g[i, 1, 0] * g[i, 1, 0] + g[i, 2, 0] * g[i, 2, 0]
-        m11 = g[i, 0, 1] * g[i, 0, 1] + g[i, 1, 1] * g[i, 1, 1] + g[i, 2, 1] * g[i, 2, 1]
-        m22 = g[i, 0, 2] * g[i, 0, 2] + g[i, 1, 2] * g[i, 1, 2] + g[i, 2, 2] * g[i, 2, 2]
-        m01 = g[i, 0, 0] * g[i, 0, 1] + g[i, 1, 0] * g[i, 1, 1] + g[i, 2, 0] * g[i, 2, 1]
-        m02 = g[i, 0, 0] * g[i, 0, 2] + g[i, 1, 0] * g[i, 1, 2] + g[i, 2, 0] * g[i, 2, 2]
-        m12 = g[i, 0, 1] * g[i, 0, 2] + g[i, 1, 1] * g[i, 1, 2] + g[i, 2, 1] * g[i, 2, 2]
+        # Scalars throughout, as above; and each element is read once, since every access takes time to compile.
+        ax, ay, az = g[i, 0, 0], g[i, 1, 0], g[i, 2, 0]
+        bx, by, bz = g[i, 0, 1], g[i, 1, 1], g[i, 2, 1]
+        cx, cy, cz = g[i, 0, 2], g[i, 1, 2], g[i, 2, 2]
+        m00 = ax * ax + ay * ay + az * az
+        m11 = bx * bx + by * by + bz * bz
+        m22 = cx * cx + cy * cy + cz * cz
+        m01 = ax * bx + ay * by + az * bz
+        m02 = ax * cx + ay * cy + az * cz
+        m12 = bx * cx + by * cy + bz * cz
         q = (m00 + m11 + m22) / 3.0
         off = m01 * m01 + m02 * m02 + m12 * m12
         d00, d11, d22 = m00 - q, m11 - q, m22 - q

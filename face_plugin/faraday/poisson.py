@@ -177,11 +177,12 @@ def _fill_rows(vertices, tets, flat, free, normal, fill, index, value):  # type:
         for i in range(4):
             row = flat[tets[t, i]]
             if row < free:
+                nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
+                place = fill[row]
+                fill[row] = place + 4
                 for j in range(4):
-                    dot = normal[i, 0] * normal[j, 0] + normal[i, 1] * normal[j, 1] + normal[i, 2] * normal[j, 2]
-                    index[fill[row]] = flat[tets[t, j]]
-                    value[fill[row]] = dot / (6.0 * six)
-                    fill[row] += 1
+                    index[place + j] = flat[tets[t, j]]
+                    value[place + j] = (nx * normal[j, 0] + ny * normal[j, 1] + nz * normal[j, 2]) / (6.0 * six)
 
 
 @compiled()

@@ -59,7 +59,8 @@ class _Listener(event.Listener):
         module = event.data["dispatcher"].py_func.__module__ or ""
         if module.split(".")[0] == __name__.split(".")[0] and "compiling" not in _said:
             _said.add("compiling")
-            log.info("compiling code for this machine, once: a few seconds")
+            kept = "" if "uncached" in _said else ", once"
+            log.info("compiling code for this machine%s: a few seconds", kept)
 
     def on_end(self, event: Any) -> None:
         """Hear from numba that it has done so."""

@@ -1,13 +1,14 @@
 # make demo      a mesh and two pictures of a generated cloud, in out/
 # make test      the tests that take seconds        make test-all   all of them
 # make lint      ruff (its format too) and mypy     make bench      the benchmarks
+# make fuzz      random clouds, files, faults and threads: N= cases from SEED=, only those of KIND=
 # Each makes .venv first, and makes it again when pyproject.toml has changed. PYTHON=... chooses the interpreter.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: demo test test-all lint bench setup
+.PHONY: demo test test-all lint bench fuzz setup
 
 PYTHON ?= python3
 VENV := .venv
@@ -51,6 +52,11 @@ lint: $(STAMP)
 bench: $(STAMP)
 	@mkdir -p out
 	$(BIN)/python benchmarks/scaling.py --sizes 1000 5000 20000 --output out
+
+N ?= 1000
+SEED ?= 0
+fuzz: $(STAMP)
+	@$(BIN)/python tests/fuzz --cases $(N) --seed $(SEED) $(if $(KIND),--kind $(KIND))
 
 setup: $(STAMP)
 

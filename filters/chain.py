@@ -20,6 +20,7 @@ from face_plugin.filters.pointset import PointSet
 from face_plugin.filters.sculpt import Sculpt
 from face_plugin.filters.surface import Surface
 from face_plugin.filters.thin import Thin
+from face_plugin.io.cloudfile import replacing
 from face_plugin.stages import Progress
 
 __all__ = ["FILTERS", "Chain"]
@@ -120,13 +121,13 @@ class Chain(Filter):
         if path.suffix.lower() not in modules:
             raise ValueError(f"{path}: a chain must be a .json or .toml file")
         parser = importlib.import_module(modules[path.suffix.lower()])
-        text = path.read_text(encoding="utf-8")
+        data = path.read_bytes()
         try:
-            content = parser.loads(text)
+            content = parser.loads(data.decode("utf-8-sig"))
             if not isinstance(content, dict):
                 raise ValueError(f"must hold a table, found {type(content).__name__}")
             chain = cls.from_dict(content)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise ValueError(f"{path}: {error}") from error
         # A chain and its sculpt lie side by side, wherever the chain is run from.
         return cls(
@@ -137,7 +138,7 @@ class Chain(Filter):
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the chain to a .json or .toml file, which `load` reads back to an equal chain."""
+        """Write the chain to a .json or .toml file, whole or not at all; `load` reads it back to an equal chain."""
         path = Path(path)
         if path.suffix.lower() == ".json":
             text = json.dumps(self.to_dict(), indent=2) + "\n"
@@ -148,4 +149,5 @@ class Chain(Filter):
             text = "\n".join(f"[[steps]]\n{table}" for table in tables)
         else:
             raise ValueError(f"{path}: a chain must be a .json or .toml file")
-        path.write_text(text, encoding="utf-8")
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")

@@ -26,10 +26,10 @@ def read_steps(path: str | os.PathLike[str]) -> list[Element]:
     OSError
         The file cannot be read; the host would print that and go on.
     """
-    text = Path(path).read_text(encoding="utf-8")
+    data = Path(path).read_bytes()
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+        root = ElementTree.fromstring(data.decode("utf-8-sig"))
+    except (ElementTree.ParseError, ValueError) as error:
         raise ValueError(f"{path}: not a MeshLab filter script: {error}") from None
     if root.tag != "FilterScript":
         raise ValueError(f"{path}: not a MeshLab filter script: holds <{root.tag}>")

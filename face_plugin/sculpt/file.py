@@ -83,7 +83,7 @@ class SculptFile:
         try:
             content = json.loads(path.read_bytes().decode("utf-8-sig"), object_pairs_hook=_once)
             return cls._from_json(content)
-        except ValueError as error:  # a file that is not JSON or not UTF-8 raises subclasses of it
+        except (ValueError, RecursionError) as error:  # of what is not JSON or not UTF-8, or is nested without end
             raise ValueError(f"{path}: {error}") from error
 
     @classmethod

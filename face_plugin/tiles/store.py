@@ -216,5 +216,5 @@ def _undamaged(path: Path) -> Iterator[None]:
     """Say of a file of a store that cannot be read which one it is: a folder to go on from is input like any other."""
     try:
         yield
-    except (ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, TypeError, KeyError, EOFError, RecursionError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path}: nothing to go on from ({error}): remove {path.parent}, or do not resume") from error

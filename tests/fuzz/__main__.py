@@ -1,7 +1,8 @@
 """Random cases of every kind, in processes of their own under a watchdog: python tests/fuzz --cases 1000 --seed 0.
 
-A case is a function ``case(seed, folder) -> str`` of a module of this folder. It returns what became of it in a few
-words that may be counted, or raises where that is no outcome that anybody was promised.
+A case is a function ``case(seed, folder) -> str`` of a module of this folder, which may have a ``prepare()`` for what
+takes its time only once, such as compiling. It returns what became of it in a few words that may be counted, or raises
+where that is no outcome that anybody was promised.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ def child(kind: str, first: int, count: int, step: int) -> None:
     answer = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
     module = importlib.import_module(kind)
+    if hasattr(module, "prepare"):
+        module.prepare()
     answer.write("ready\n")
     for seed in range(first, first + count, step):
         with tempfile.TemporaryDirectory(prefix="face-fuzz-") as folder:

@@ -119,6 +119,10 @@ def settings(r: np.random.Generator) -> tuple[dict[str, Any], bool]:
     return chosen, True
 
 
+def prepare() -> None:
+    reconstruct(sphere(np.random.default_rng(0), 80), depth=4)
+
+
 def case(seed: int, folder: Path) -> str:
     r = np.random.default_rng([seed, 1])
     with warnings.catch_warnings(), np.errstate(all="ignore"):

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from face_plugin import shapes
+from face_plugin import Params, estimate_normals, shapes
 from face_plugin.io import read_cloud
 
 POINTS = shapes.sphere(2500).points
@@ -69,6 +69,11 @@ def check(output: Path, *, whole: bool) -> None:
     assert len(cloud) == len(POINTS)
     if cloud.normals is not None:
         np.testing.assert_allclose(np.linalg.norm(cloud.normals.astype(float), axis=1), 1, atol=1e-3)
+
+
+def prepare() -> None:
+    for tiles in (None, 1250):
+        estimate_normals(POINTS, Params(tile_points=tiles, engine="serial"))
 
 
 def case(seed: int, folder: Path) -> str:

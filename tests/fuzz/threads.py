@@ -14,6 +14,10 @@ from face_plugin.io import CloudFile, read_cloud, write_cloud
 SHAPES = (shapes.sphere, shapes.torus, shapes.teapot)
 
 
+def prepare() -> None:
+    reconstruct(shapes.sphere(2500).points, Params(tile_points=1250, engine="serial"), depth=4)
+
+
 def case(seed: int, folder: Path) -> str:
     rng = np.random.default_rng([seed, 3])
 

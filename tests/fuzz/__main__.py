@@ -49,13 +49,14 @@ def child(kind: str, first: int, count: int, step: int) -> None:
         answer.write(f"{seed} {outcome}\n")
 
 
-def watched(kind: str, first: int, last: int, step: int, until: float, found: Found) -> None:
+def watched(kind: str, first: int, last: int, step: int, until: float, place: str, found: Found) -> None:
     """Run cases in children, a new one after each that crashes or hangs."""
     seed = first
     while seed < last and time.monotonic() < until:
         words = [sys.executable, str(HERE), "--child", kind, str(seed), str(last - seed), str(step)]
         lines: queue.Queue[str] = queue.Queue()
-        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "env": {**os.environ, "TMPDIR": place}}
+        with subprocess.Popen(words, text=True, **options) as process:
 
             def read(stream=process.stdout, lines=lines) -> None:
                 for line in stream:
@@ -94,13 +95,15 @@ def main() -> int:
         child(args.child[0], *map(int, args.child[1:]))
         return 0
     found: Found = queue.Queue()
+    # What children that are killed leave behind goes with it.
+    place = tempfile.TemporaryDirectory(prefix="face-fuzz-", ignore_cleanup_errors=True)
     shares = {args.kind: 1.0} if args.kind else KINDS
     workers, start, counts = os.cpu_count() or 1, time.monotonic(), Counter[tuple[str, str]]()
     for kind, share in shares.items():
         until = time.monotonic() + args.seconds * share
         last = args.seed + max(1, round(args.cases * share))
         threads = [
-            threading.Thread(target=watched, args=(kind, args.seed + k, last, workers, until, found))
+            threading.Thread(target=watched, args=(kind, args.seed + k, last, workers, until, place.name, found))
             for k in range(min(workers, last - args.seed))
         ]
         for thread in threads:
@@ -116,6 +119,7 @@ def main() -> int:
                 sys.stdout.flush()
     for (kind, outcome), number in sorted(counts.items()):
         sys.stdout.write(f"{number:7} {kind:8} {outcome}\n")
+    place.cleanup()
     failed = sum(number for (_, outcome), number in counts.items() if outcome.startswith("FAILED"))
     sys.stdout.write(f"{sum(counts.values()):7} cases, {failed} failed, {time.monotonic() - start:.0f} s\n")
     return int(failed > 0)

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from face_plugin import cloud
 from face_plugin.params import Params
-from face_plugin.result import Result, Surface
+from face_plugin.result import Result, Surface, kept_points
 from face_plugin.sculpt import SculptFile
+from face_plugin.sides.sensors import Sensors, sensors_of
 from face_plugin.solver import FaCE
 from face_plugin.stages import Progress
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
@@ -25,6 +26,7 @@ def solve(
     points: ArrayLike,
     params: Params | None = None,
     *,
+    sensors: Sensors | None = None,
     classify: bool = False,
     engine: EngineLike = None,
     progress: Progress | None = None,
@@ -35,6 +37,8 @@ def solve(
     ----------
     points, params, engine, progress
         As of `estimate_normals`.
+    sensors : Sensors, optional
+        Where sensors stood.
     classify : bool
         Whether it will be asked which points are interior: tiles then find it out in the same pass.
 
@@ -46,12 +50,17 @@ def solve(
     """
     array = cloud.as_points(points)
     if in_tiles(len(array), params or Params()):
-        return Tiled(array, params, classify=classify, engine=engine, progress=progress)
-    return FaCE(array, params, progress=progress)
+        return Tiled(array, params, sensors=sensors, classify=classify, engine=engine, progress=progress)
+    return FaCE(array, params, sensors=sensors, progress=progress)
 
 
 def solve_whole(
-    points: ArrayLike, params: Params | None = None, *, purpose: str, progress: Progress | None = None
+    points: ArrayLike,
+    params: Params | None = None,
+    *,
+    purpose: str,
+    sensors: Sensors | None = None,
+    progress: Progress | None = None,
 ) -> FaCE:
     """Solve a cloud in one piece, whatever its size: for edits, and for the field at any position.
 
@@ -59,6 +68,8 @@ def solve_whole(
     ----------
     points, params, progress
         As of `estimate_normals`.
+    sensors : Sensors, optional
+        Where sensors stood.
     purpose : str
         What needs it, for the message.
 
@@ -69,7 +80,7 @@ def solve_whole(
     """
     array = cloud.as_points(points)
     check_one_piece(len(array), params or Params(), purpose)
-    return FaCE(array, params, progress=progress)
+    return FaCE(array, params, sensors=sensors, progress=progress)
 
 
 def estimate_normals(
@@ -77,6 +88,9 @@ def estimate_normals(
     params: Params | None = None,
     *,
     filter_interior: bool = False,
+    viewpoints: ArrayLike | None = None,
+    seen_from: ArrayLike | None = None,
+    up: ArrayLike | None = None,
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
     engine: EngineLike = None,
     progress: Progress | None = None,
@@ -92,6 +106,13 @@ def estimate_normals(
     params : Params, optional
     filter_interior : bool
         Also classify the points as interior or not.
+    viewpoints : (k, 3) array_like, optional
+        Where sensors stood, in the unit of the points. Normals then point to the space that they saw: into a room that
+        was scanned from inside, up from a terrain. Needs no knowledge of which point was seen from where.
+    seen_from : (n,) array_like of int, optional
+        Row of the viewpoint that saw each point, -1 where that is not known.
+    up : (3,) array_like, optional
+        Direction from which all was seen, from afar: of aerial scans.
     sculpt : SculptFile or path, optional
         Charges and cage points to apply. The cloud is then solved in one piece, whatever its size.
     engine : str, Engine or distributed.Client, optional
@@ -118,13 +139,14 @@ def estimate_normals(
     >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
+    sensors = sensors_of(viewpoints, seen_from, up)
     if sculpt is None:
-        solved = solve(points, params, classify=filter_interior, engine=engine, progress=progress)
+        solved = solve(points, params, sensors=sensors, classify=filter_interior, engine=engine, progress=progress)
         return solved.result(filter_interior=filter_interior)
     if not isinstance(sculpt, SculptFile):
         # A bad file is said before the cage is solved.
         sculpt = SculptFile.load(sculpt)
-    face = solve_whole(points, params, purpose="sculpting", progress=progress)
+    face = solve_whole(points, params, purpose="sculpting", sensors=sensors, progress=progress)
     return face.sculpted(sculpt).result(filter_interior=filter_interior)
 
 
@@ -135,6 +157,9 @@ def reconstruct(
     screened: bool = True,
     depth: int | None = 8,
     filter_interior: bool = True,
+    viewpoints: ArrayLike | None = None,
+    seen_from: ArrayLike | None = None,
+    up: ArrayLike | None = None,
     backend: Backend | None = None,
     trim: float = 0.0,
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
@@ -145,7 +170,7 @@ def reconstruct(
 
     Parameters
     ----------
-    points, params, sculpt, engine, progress
+    points, params, viewpoints, seen_from, up, sculpt, engine, progress
         As in `estimate_normals`.
     screened : bool
         Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
@@ -171,10 +196,18 @@ def reconstruct(
     """
     backend = check_arguments(depth, backend, trim)
     result = estimate_normals(
-        points, params, filter_interior=filter_interior, sculpt=sculpt, engine=engine, progress=progress
+        points,
+        params,
+        filter_interior=filter_interior,
+        viewpoints=viewpoints,
+        seen_from=seen_from,
+        up=up,
+        sculpt=sculpt,
+        engine=engine,
+        progress=progress,
     )
-    keep = slice(None) if result.interior is None else ~result.interior
     array = cloud.as_points(points)
+    keep = kept_points(result)
     report = progress or (lambda stage, fraction: None)
     report("surface", 0.0)
     start = time.perf_counter()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from face_plugin.compiled import compiled
 from face_plugin.threads import KDTree
 
-__all__ = ["local_spacing", "log_ramp", "plane_fit", "ramp", "thin", "unit"]
+__all__ = ["local_spacing", "log_ramp", "plane_fit", "plane_fits", "ramp", "thin", "unit"]
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -46,7 +46,26 @@ def plane_fit(
     count: int,
     width: float,
 ) -> NDArray[np.float64]:
-    """Fit planes: unit normals (n, 3), of either sign, of planes through each point's `count` nearest neighbours.
+    """Fit planes: unit normals (n, 3), of either sign; arguments as of `plane_fits`.
+
+    Examples
+    --------
+    >>> flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    >>> from face_plugin.threads import KDTree
+    >>> abs(plane_fit(flat, *KDTree(flat).query(flat, k=4), count=3, width=1.0)[0]).round(6)
+    array([0., 0., 1.])
+    """
+    return plane_fits(points, distance, neighbour, count, width)[0]
+
+
+def plane_fits(
+    points: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    neighbour: NDArray[np.intp],
+    count: int,
+    width: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fit a plane to each point's `count` nearest neighbours.
 
     Weights are Gaussian, of `width` times the mean distance to those neighbours.
 
@@ -56,12 +75,19 @@ def plane_fit(
     distance, neighbour : (n, k) float64, (n, k) intp
         Of the nearest points, ascending, the point itself first; k > count.
 
+    Returns
+    -------
+    lines : (n, 3) float64
+        Unit normals of the planes, of either sign.
+    flatness : (n,) float64
+        1 less the ratio of the two lower eigenvalues of the covariance: 1 on a plane, 0 where there is none.
+
     Examples
     --------
     >>> flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     >>> from face_plugin.threads import KDTree
-    >>> abs(plane_fit(flat, *KDTree(flat).query(flat, k=4), count=3, width=1.0)[0]).round(6)
-    array([0., 0., 1.])
+    >>> plane_fits(flat, *KDTree(flat).query(flat, k=4), count=3, width=1.0)[1].round(6)
+    array([1., 1., 1., 1.])
     """
     distance, neighbour = distance[:, : count + 1], neighbour[:, : count + 1]
     scale = width * distance[:, 1:].mean(axis=1, keepdims=True)
@@ -70,7 +96,9 @@ def plane_fit(
     offset = points[neighbour]
     offset -= np.einsum("nk,nkd->nd", weight, offset)[:, None]
     covariance = np.einsum("nk,nki,nkj->nij", weight, offset, offset)
-    return np.ascontiguousarray(np.linalg.eigh(covariance)[1][:, :, 0])
+    variance, axes = np.linalg.eigh(covariance)
+    middle = np.maximum(variance[:, 1], np.finfo(float).tiny)
+    return np.ascontiguousarray(axes[:, :, 0]), np.clip(1.0 - variance[:, 0] / middle, 0.0, 1.0)
 
 
 def ramp(values: NDArray[np.float64], ends: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """The method, step by step: what is done to a cloud in one piece, and to each tile of a larger one.
 
-    points -> cage -> mesh -> field -> votes -> sides -> angles -> interior, confidence
+    points -> strays -> cage -> mesh -> field | sights -> sides -> angles -> interior, confidence
 
 Each step is a call into one room: `faraday` is the paper, `sides` tells on which side of a point free space is, and
 `angles` tells the line of its normal. Sections are those of the paper.
@@ -22,10 +22,14 @@ from face_plugin.faraday import field
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.faraday.solve import SolvedCage, solve_cage
+from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
+from face_plugin.sides.patches import turned_patches
+from face_plugin.sides.sensors import resettled, sides_by_sensors
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.steps import turn_sides
+from face_plugin.sides.vantage import is_open, sides_from_vantage
 from face_plugin.stages import Stage
 
 __all__ = ["Solved", "orient", "refine", "solve_field"]
@@ -81,46 +85,48 @@ def solve_field(
 
 def orient(
     around: Neighbourhood,
-    seen: FieldAtPoints,
+    field: FieldAtPoints,
     params: Params,
     *,
     plane: NDArray[np.float64] | None = None,
     sheets: Sheets | None = None,
     moving: NDArray[np.bool_] | None = None,
+    sights: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """From the field at the points to their normals.
+    """From the field at the points, and what sensors saw, to their normals.
 
     Parameters
     ----------
     around : Neighbourhood
         Of the points.
-    seen : FieldAtPoints
+    field : FieldAtPoints
     params : Params
     plane : (3,) float64, optional
         Unit normal of the plane that all points lie in.
-    sheets, moving
+    sheets, moving, sights
         As of `refine`.
 
     Returns
     -------
     (n, 3) float64
-        Outward unit normals.
+        Unit normals that point to free space.
     """
     if plane is not None:
         # The field is the same on both sides of a sheet: its mean gradient lies in the sheet.
-        return np.tile(plane, (len(around), 1))
-    if params.angles == "field":
+        normals = np.tile(plane, (len(around), 1))
+        return normals if sights is None or np.sum(sights @ plane) >= 0 else -normals
+    if params.angles == "field" and sights is None:
         # The strength grows outward, so its gradient at a ball points outward (3.4).
-        return seen.normals
-    return refine(around, seen.votes, seen.strength, sheets, moving)
+        return field.normals
+    return refine(around, field, sheets, moving, sights)
 
 
 def refine(
     around: Neighbourhood,
-    votes: NDArray[np.float64],
-    strength: NDArray[np.float64],
+    field: FieldAtPoints,
     sheets: Sheets | None = None,
     moving: NDArray[np.bool_] | None = None,
+    sights: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Refine rough outward normals by the points themselves: first their side, then their angle.
 
@@ -128,19 +134,20 @@ def refine(
     ----------
     around : Neighbourhood
         Of the points.
-    votes : (n, 3) float64
-        Rough outward unit normals, most of them on the right side; zero where nothing is known.
-    strength : (n,) float64
-        E_max at the points.
+    field : FieldAtPoints
+        Its `votes` are rough outward normals, most of them on the right side; zero where nothing is known.
     sheets : Sheets, optional
         Of the points, where they are known already; those of points that do not move are not looked at.
     moving : (n,) bool, optional
         Which normals to refine; the others take part as they are. By default all.
+    sights : (n, 3) float64, optional
+        Directions in which sensors saw the points, as `face_plugin.sides.sensors.sights` has them: they decide on the
+        sides then, and the field does not.
 
     Returns
     -------
     (n, 3) float64
-        Outward unit normals.
+        Unit normals that point to free space.
 
     Examples
     --------
@@ -148,26 +155,57 @@ def refine(
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(500)
     >>> rough = unit(ball.normals + 0.3 * np.random.default_rng(0).normal(size=(500, 3)))
-    >>> refined = refine(Neighbourhood(ball.points), rough, np.ones(500))
+    >>> refined = refine(Neighbourhood(ball.points), FieldAtPoints(np.ones(500), rough, np.ones(500)))
     >>> bool(((refined * ball.normals).sum(axis=1) > 0.99).all())
     True
     """
     points, neighbour = around.points, around.neighbour
     still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
     # Plates thinner than the spacing look like noise: there the field alone tells the side, and a fit the angle.
-    plate = back_to_back(around, votes)
+    plate = back_to_back(around, field.votes)
 
-    # 1. Side: stray points turn round to those around them.
-    side = turn_sides(around, votes, strength, sheets or find_sheets(around), plate | still)
+    # 1. Side.
+    if sights is None:
+        side = _sides_by_field(around, field, sheets or find_sheets(around), still, plate)
+    else:
+        side = sides_by_sensors(around, sights)
 
     # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending
     # allows, and from a narrow kernel where the points only just resolve the surface.
     turned = turn_angles(around, side, plate, still)
+    refined = turned.normals
 
     # 3. Borders: where a sheet ends in the open, the field has a say in the angle as well.
-    refined = bend_borders(points, turned.normals, votes, strength, neighbour)
+    if sights is None:
+        refined = bend_borders(points, refined, field.votes, field.strength, neighbour)
 
     # 4. Level: the surface that the normals describe together is made to pass through the points.
     weight = level_weight(around.distance, neighbour, 1.0 - turned.resolved, turned.residual)
     refined = level(around.tree, refined, neighbour, turned.width, weight)
-    return np.where(still[:, None], votes, refined)
+    if sights is not None:
+        # The angle is known better now, and so is which side of it was seen.
+        refined = resettled(around, refined, sights)
+    return np.where(still[:, None], field.votes, refined)
+
+
+def _sides_by_field(
+    around: Neighbourhood,
+    field: FieldAtPoints,
+    sheets: Sheets,
+    still: NDArray[np.bool_],
+    plate: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Find normals (n, 3) of the side that the field, the neighbours and the winding number tell together."""
+    votes, kept = field.votes, plate | still
+    # Stray votes turn round to those around them.
+    side = turn_sides(around, votes, field.strength, sheets, kept)
+    # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
+    for by_sheets in (True, False, False):
+        field_says = field.lean * np.einsum("nd,nd->n", votes, side)
+        turned = turned_patches(around, unit(side), field_says, field.strength, by_sheets=by_sheets) & ~kept
+        if turned.any():
+            side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
+    if is_open(field.difference) and not kept.any():
+        # Parts of an open scan that no sheet joins learn of one another where both are seen.
+        side = sides_from_vantage(around, side)
+    return side

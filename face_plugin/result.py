@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.errors import FaceError
 from face_plugin.params import Params
 
-__all__ = ["Result", "Surface"]
+__all__ = ["Result", "Surface", "kept_points"]
+
+log = logging.getLogger(__name__)
+
+# Share of points left out that is no longer a matter of course.
+MANY = 0.25
+# Fewest points that a surface is made from.
+FEWEST = 4
 
 
 @dataclass(frozen=True)
@@ -29,6 +38,37 @@ class Result:
     """Seconds by stage."""
     params: Params
     """The settings as resolved."""
+    strays: NDArray[np.bool_]
+    """(n,) whether the point lies too far from everything to belong to a surface; its confidence is 0, and its normal
+    that of the nearest point that is none."""
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """(n,) the points that a surface is made from: neither strays nor interior."""
+        return ~self.strays if self.interior is None else ~(self.strays | self.interior)
+
+
+def kept_points(result: Result) -> NDArray[np.bool_]:
+    """Points (n,) that a surface is made from; many left out are told, and hardly any left is an error.
+
+    Raises
+    ------
+    FaceError
+        Fewer than four points are kept.
+    """
+    kept = result.kept
+    count, strays = len(kept), int(result.strays.sum())
+    interior = 0 if result.interior is None else int(result.interior.sum())
+    found = f"{interior} of {count} points as interior and {strays} as strays"
+    if np.count_nonzero(kept) < FEWEST:
+        raise FaceError(f"nothing is left to make a surface from: found {found}; try filter_interior=False")
+    if np.count_nonzero(~kept) > MANY * count:
+        log.warning(
+            "%s are left out of the surface: is this a scan from inside (give its viewpoints), or are most points "
+            "strays? filter_interior=False keeps all",
+            found,
+        )
+    return kept
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,9 @@ from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence
+from face_plugin.sides.sensors import Sensors, sights
 from face_plugin.sides.sheets import Sheets
+from face_plugin.sides.strays import find_strays, without
 from face_plugin.stages import Clock, Progress, Stage
 
 __all__ = ["FaCE"]
@@ -41,6 +43,12 @@ class Reading:
     strength: NDArray[np.float64]
     """(m,) E_max at the vertices of the mesh."""
     stage: Stage
+    sensors: Sensors | None = None
+
+    @cached_property
+    def sights(self) -> NDArray[np.float64] | None:
+        """Directions (m, 3) in which sensors saw the distinct points."""
+        return None if self.sensors is None else sights(self.around, self.sensors)
 
     @cached_property
     def seen(self) -> FieldAtPoints:
@@ -51,12 +59,14 @@ class Reading:
     def normals(self) -> NDArray[np.float64]:
         """Normals of the distinct points (m, 3)."""
         with self.stage("normals"):
-            return orient(self.around, self.seen, self.params, plane=self.plane, sheets=self.sheets)
+            return orient(self.around, self.seen, self.params, plane=self.plane, sheets=self.sheets, sights=self.sights)
 
     @cached_property
     def enclosed(self) -> NDArray[np.bool_]:
         """Which distinct points (m,) the others enclose."""
-        return enclosure.enclosed(self.around, self.normals, self.seen.strength)
+        found = enclosure.enclosed(self.around, self.normals, self.seen.strength)
+        # What a sensor saw does not lie inside anything.
+        return found if self.sights is None else found & ~self.sights.any(axis=1)
 
     @cached_property
     def confidence(self) -> NDArray[np.float64]:
@@ -86,6 +96,8 @@ class FaCE(Sculptable):
     ----------
     points : (n, 3) array_like of float or int, in any unit
     params : Params, optional
+    sensors : Sensors, optional
+        Where sensors stood: normals then point to what they saw.
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -95,6 +107,8 @@ class FaCE(Sculptable):
         The distinct points in the canonical frame, in which `balls`, `mesh` and `poisson` are as well; `frame` is the
         way between it and the input. What methods take and return is in the coordinates of the input.
     balls : Balls
+    strays : (n,) bool
+        Input points that lie too far from everything to take part.
     mesh : CageMesh
     poisson : Poisson
     vertex_strength : (m,) float64
@@ -109,14 +123,28 @@ class FaCE(Sculptable):
     True
     """
 
-    def __init__(self, points: ArrayLike, params: Params | None = None, *, progress: Progress | None = None) -> None:
+    def __init__(
+        self,
+        points: ArrayLike,
+        params: Params | None = None,
+        *,
+        sensors: Sensors | None = None,
+        progress: Progress | None = None,
+    ) -> None:
         self.params = params or Params()
         clock = Clock(progress)
         self.timings = clock.seconds
         with clock("cloud"):
             self.cloud = cloud.prepare(points)
-            self.frame = self.cloud.frame
-        around = Neighbourhood(self.cloud.points)
+            around = Neighbourhood(self.cloud.points)
+        # Points too far from everything take no part.
+        with clock("strays"):
+            stray = find_strays(around)
+            self.strays = stray[self.cloud.rows]
+            if stray.any():
+                self.cloud = without(self.cloud, points, self.strays)
+                around = Neighbourhood(self.cloud.points)
+        self.frame = self.cloud.frame
         solved = solve_field(around, self.params, self.frame.scale, stage=clock)
         self.balls, self.mesh, self.poisson = solved.cage.balls, solved.cage.mesh, solved.cage.poisson
         strength_of = partial(field.strength, self.mesh, directions=self.params.directions)
@@ -124,7 +152,8 @@ class FaCE(Sculptable):
             self.mesh, self.poisson, self.balls, self.cloud, solved.cage.potential, solved.strength, strength_of
         )
         plane = self.cloud.plane_normal() if self.cloud.flat else None
-        self._reading = Reading(solved.cage, around, solved.sheets, plane, self.params, solved.strength, clock)
+        local = None if sensors is None else sensors.in_frame(self.frame, self.cloud.rows)
+        self._reading = Reading(solved.cage, around, solved.sheets, plane, self.params, solved.strength, clock, local)
 
     def _follow(self) -> None:
         self._reading = dataclasses.replace(self._reading, params=self.params, strength=self._sculptor.strength)
@@ -177,7 +206,7 @@ class FaCE(Sculptable):
         (n,) bool
         """
         alpha = Params(alpha=self.params.alpha if alpha is None else alpha).alpha  # type: ignore[arg-type]
-        return self._reading.interior(alpha)[self.cloud.rows]
+        return self._reading.interior(alpha)[self.cloud.rows] & ~self.strays
 
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
@@ -189,7 +218,8 @@ class FaCE(Sculptable):
         return Result(
             normals=oriented,
             strength=self._reading.seen.strength[rows].astype(dtype),
-            confidence=self._reading.confidence[rows].astype(dtype),
+            confidence=np.where(self.strays, 0.0, self._reading.confidence[rows]).astype(dtype),
+            strays=self.strays,
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=params,

@@ -15,7 +15,7 @@ __all__ = ["Interior"]
 
 @dataclass(frozen=True)
 class Interior(Filter):
-    """Keep no point that lies inside the object; the attribute ``interior`` tells which do.
+    """Keep no point that lies inside the object, and no stray; the attribute ``interior`` tells which lie inside.
 
     Parameters
     ----------
@@ -47,4 +47,5 @@ class Interior(Filter):
         """Return `layer` with the interior points out of ``keep``; normals stay as they are."""
         cage = layer.replace(classify=True).solved(self.params, progress)
         inside = layer.scatter(cage.interior(self.alpha))
-        return layer.replace(keep=layer.keep & ~inside, attributes={**layer.attributes, "interior": inside})
+        keep = layer.keep & ~inside & ~layer.scatter(cage.strays)
+        return layer.replace(keep=keep, attributes={**layer.attributes, "interior": inside})

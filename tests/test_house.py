@@ -23,6 +23,7 @@ ROOMS = [
     "filters",
     "adapters",
     "app",
+    "cli",
 ]
 LONGEST = {"adapters": 150}
 LONGEST_ELSEWHERE = 300

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, Params, shapes
+from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.geometry import unit
 from face_plugin.method import refine
 from face_plugin.neighbourhood import Neighbourhood
@@ -20,8 +21,10 @@ def rough(normals: np.ndarray, flipped: float, seed: int = 0) -> np.ndarray:
     return noisy * np.where(rng.random(len(normals)) < flipped, -1.0, 1.0)[:, None]
 
 
-def refined(shape: shapes.Shape, normals: np.ndarray, strength: float = 1.0) -> np.ndarray:
-    return refine(Neighbourhood(shape.points), normals, np.full(len(normals), strength))
+def refined(points: np.ndarray, normals: np.ndarray, strength: float = 1.0) -> np.ndarray:
+    """What becomes of rough normals where the field is as strong as this, and shielded on one side."""
+    count = len(points)
+    return refine(Neighbourhood(points), FieldAtPoints(np.full(count, strength), normals, np.ones(count)))
 
 
 def angles(normals: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -31,7 +34,7 @@ def angles(normals: np.ndarray, truth: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("make", [shapes.sphere, shapes.torus])
 def test_stray_points_are_turned_round_and_angles_improve(make):
     shape = make(1500, 0)
-    error = angles(refined(shape, rough(shape.normals, 0.1)), shape.normals)
+    error = angles(refined(shape.points, rough(shape.normals, 0.1)), shape.normals)
     # Measured over seeds 0 to 4: largest error below 7 degrees, mean below 2.
     assert error.max() < 15
     assert error.mean() < 3
@@ -39,7 +42,7 @@ def test_stray_points_are_turned_round_and_angles_improve(make):
 
 def test_edges_stay_sharp():
     box = shapes.box(3000, 0)
-    error = angles(refined(box, rough(box.normals, 0.0)), box.normals)
+    error = angles(refined(box.points, rough(box.normals, 0.0)), box.normals)
     # Off the edges a plane fit is exact; near them neighbours of the other face pull.
     assert np.median(error) < 1
     assert error.mean() < 6
@@ -47,7 +50,7 @@ def test_edges_stay_sharp():
 
 def test_scattered_points_get_the_mean_surface():
     ball = shapes.with_noise(shapes.sphere(3000, 0), 0.015, 0)
-    error = angles(refined(ball, rough(ball.normals, 0.05)), ball.normals)
+    error = angles(refined(ball.points, rough(ball.normals, 0.05)), ball.normals)
     # The spacing is about 0.06: noise of a quarter of it tilts small fits by more than 15 degrees.
     assert error.mean() < 9
     assert (error < 90).all()
@@ -77,7 +80,7 @@ def test_the_next_sheet_is_a_walls_thickness_away():
 
 def test_few_points_are_enough():
     points = shapes.sphere(12, 0).points
-    assert refine(Neighbourhood(points), unit(points), np.ones(12)).shape == (12, 3)
+    assert refined(points, unit(points)).shape == (12, 3)
 
 
 def bar(n: int = 80, thickness: float = 0.8) -> tuple[np.ndarray, np.ndarray]:
@@ -89,10 +92,10 @@ def bar(n: int = 80, thickness: float = 0.8) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_bar_thinner_than_the_spacing_keeps_the_fields_sides():
     points, normals = bar()
-    kept = refine(Neighbourhood(points), normals, np.full(len(points), 3.0))
+    kept = refined(points, normals, 3.0)
     assert ((kept * normals).sum(axis=1) > 0).mean() > 0.95
     # Without a field that stands out, the same points could as well be noise about a curve: their sides drift.
-    drifted = refine(Neighbourhood(points), normals, np.full(len(points), 0.01))
+    drifted = refined(points, normals, 0.01)
     assert ((drifted * normals).sum(axis=1) > 0).mean() < 0.9
 
 
@@ -125,5 +128,5 @@ def test_a_stroke_far_from_the_next_one_is_turned_to_their_common_outside():
     points = normals + x[:, None] * [1.0, 0.0, 0.0]
     wrong = (np.arange(len(points)) // 320 == 2) & (x < 2.0)
     rough_normals = np.where(wrong[:, None], -normals, normals)
-    sides = (refine(Neighbourhood(points), rough_normals, np.ones(len(points))) * normals).sum(axis=1) > 0
+    sides = (refined(points, rough_normals) * normals).sum(axis=1) > 0
     assert sides.mean() > 0.99

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from face_plugin import FaCE, Params, estimate_normals, shapes
 
-STAGES = ["cloud", "cage", "domain", "mesh", "poisson", "field", "normals"]
+STAGES = ["cloud", "strays", "cage", "domain", "mesh", "poisson", "field", "normals"]
 
 
 def judged(shape, normals):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.field import vertex_gradients
 from face_plugin.faraday.meshers import CageMesh
-from face_plugin.geometry import unit
+from face_plugin.geometry import log_ramp, unit
 from face_plugin.threads import KDTree
 
 __all__ = ["FieldAtPoints", "ball_means", "carry", "field_at_points", "field_normals"]
@@ -18,6 +18,11 @@ __all__ = ["FieldAtPoints", "ball_means", "carry", "field_at_points", "field_nor
 CARRY_NEIGHBOURS = 3
 # E_max below which double precision leaves nothing of the direction of its gradient; unshielded space has 1.
 ROUNDING = 1e-9
+# Change of E_max over a ball's radius, relative to E_max there, from which one side counts as shielded: where E_max is
+# linear from 0 on one side of the ball to its value on the other, the change over the radius is half of that value.
+SHIELDED = 0.5
+# E_max from and to which a side is lit: less may have leaked in between the balls (the paper's alpha is 0.01 to 0.05).
+LIT = (1e-3, 1e-1)
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,13 @@ class FieldAtPoints:
     """(n,) E_max at the nearest ball."""
     normals: NDArray[np.float64]
     """(n, 3) unit gradients of E_max, which point outward."""
+    difference: NDArray[np.float64]
+    """(n,) how far the two sides differ, in [0, 1]: 0 where the field is alike on both, 1 where one is shielded."""
+
+    @property
+    def lean(self) -> NDArray[np.float64]:
+        """How clearly (n,) the field tells the sides, in [0, 1]: `difference`, less where the field may be a leak."""
+        return self.difference * log_ramp(self.strength, LIT)
 
     @property
     def votes(self) -> NDArray[np.float64]:
@@ -51,8 +63,11 @@ def field_at_points(
         In the frame of the mesh.
     """
     ball = KDTree(balls.centres).query(points)[1]
-    normals = carry(balls.centres, field_normals(mesh, strength), points)
-    return FieldAtPoints(ball_means(mesh, strength)[ball], normals)
+    gradient = ball_means(mesh, vertex_gradients(mesh, strength[:, None])[:, :, 0])
+    at_balls = ball_means(mesh, strength)
+    change = np.linalg.norm(gradient, axis=1) * balls.radii / np.maximum(at_balls, np.finfo(float).tiny)
+    difference = np.minimum(change / SHIELDED, 1.0)
+    return FieldAtPoints(at_balls[ball], carry(balls.centres, unit(gradient), points), difference[ball])
 
 
 def ball_means(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float64]:

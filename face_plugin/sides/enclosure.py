@@ -26,8 +26,13 @@ __all__ = ["automatic_alpha", "enclosed", "threshold"]
 ENCLOSED = 0.9
 STILL_ENCLOSED = 0.6
 BY_ALL = 0.35
-# Length of the step, in spacings: what lies less deep than about that counts as surface.
+# Length of the step beyond the band in which the points scatter, in spacings: what lies less deep counts as surface.
 STEP = 1.0
+# Two layers are apart where there is a gap of this many spacings between heights above the tangent plane: in normally
+# distributed noise as large as the spacing gaps are smaller, out to twice the deviation.
+APART = 0.25
+# Points farther than this many spacings from the normal through a point do not stand above it.
+BESIDE = 2.4
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
 ENCLOSED_WIDTH = 0.5
 # Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which
@@ -74,10 +79,32 @@ def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDAr
             outer = np.where(inner[:, None], 0.0, normals)
             number = tree.number(outer, width)
     found = number > ENCLOSED
-    step_outward = points + STEP * spacing[:, None] * normals
+    step = STEP * spacing
+    step[found] += _band(around, normals, np.flatnonzero(found))
+    step_outward = points + step[:, None] * normals
     for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
         found &= tree.number(dipoles, np.where(found, width, 0.0), step_outward) > level
     return found
+
+
+def _band(around: Neighbourhood, normals: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    """How far (k,) the neighbours of points reach up along the normal without a gap, as those of one noisy sheet do.
+
+    Points scatter about a sheet in a band. A deep one of the band is enclosed by the others, and so is a short step
+    outward from it; it is part of the surface all the same. A second layer has a gap between.
+    """
+    neighbour = around.neighbour[rows, 1:]
+    offset = around.points[neighbour] - around.points[rows][:, None]
+    height = np.einsum("nkd,nd->nk", offset, normals[rows])
+    # Only what faces the same way and lies above rather than beside: a second layer that bends comes down at the side.
+    same = np.einsum("nkd,nd->nk", normals[neighbour], normals[rows]) > 0
+    beside = around.distance[rows, 1:] ** 2 - height**2
+    near = beside < (BESIDE * around.spacing[rows, None]) ** 2
+    height = np.where(same & near, np.maximum(height, 0.0), 0.0)
+    height = np.concatenate([np.zeros((len(rows), 1)), np.sort(height, axis=1)], axis=1)
+    gap = np.diff(height, axis=1)
+    reached = np.cumsum(gap > APART * around.spacing[rows][:, None], axis=1) == 0
+    return np.asarray(np.where(reached, gap, 0.0).sum(axis=1))
 
 
 def automatic_alpha(strength: NDArray[np.float64]) -> float:

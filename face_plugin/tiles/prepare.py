@@ -16,6 +16,7 @@ from face_plugin.cloud import Frame
 from face_plugin.io.disk import allocated
 from face_plugin.io.sources import CHUNK, Source
 from face_plugin.params import Params
+from face_plugin.sides.sensors import Sensors
 from face_plugin.tiles.coarse import VOXELS_PER_POINT, Voxels, voxel_size
 from face_plugin.tiles.partition import Partition, split
 from face_plugin.tiles.plan import allowed_memory, fitting_tile_points
@@ -39,10 +40,12 @@ MOST_A_COARSE = 500
 _NOT_IN_KEY = ("max_memory", "engine", "workers")
 
 
-def store_key(source: Source, params: Params, interior: bool) -> str:
+def store_key(source: Source, params: Params, interior: bool, sensors: Sensors | None = None) -> str:
     """Hash of the input and of the settings that the outcome depends on."""
     settings = {name: value for name, value in params.to_dict().items() if name not in _NOT_IN_KEY}
-    text = json.dumps([source.digest(), settings, interior], sort_keys=True)
+    text = json.dumps(
+        [source.digest(), settings, interior, None if sensors is None else sensors.to_dict()], sort_keys=True
+    )
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 

@@ -17,6 +17,7 @@ from face_plugin.io.sources import CHUNK, ArraySource, Source
 from face_plugin.params import Params
 from face_plugin.result import Result
 from face_plugin.sides import enclosure
+from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Clock, Progress
 from face_plugin.tiles.coarse import Voxels, solve_coarse
 from face_plugin.tiles.engines import Engine, Job
@@ -35,6 +36,7 @@ def estimate_tiled(
     points: ArrayLike,
     params: Params | None = None,
     *,
+    sensors: Sensors | None = None,
     filter_interior: bool = False,
     engine: EngineLike = None,
     progress: Progress | None = None,
@@ -45,6 +47,8 @@ def estimate_tiled(
     ----------
     points : (n, 3) array_like of float or int, in any unit
     params : Params, optional
+    sensors : Sensors, optional
+        Where sensors stood, in the unit of the points.
     filter_interior : bool
         Also classify the points as interior or not.
     engine : str, Engine or distributed.Client, optional
@@ -78,7 +82,13 @@ def estimate_tiled(
     source = ArraySource(cloud.as_points(points))
     with tempfile.TemporaryDirectory(prefix="face-") as folder:
         store, timings = solve_store(
-            Path(folder), source, params, classify=filter_interior, engine=engine, progress=progress
+            Path(folder),
+            source,
+            params,
+            sensors=sensors,
+            classify=filter_interior,
+            engine=engine,
+            progress=progress,
         )
         found = collect(store)
         if filter_interior:
@@ -90,6 +100,7 @@ def estimate_tiled(
             interior=found.get("interior"),
             timings={**timings, **tile_seconds(store)},
             params=params,
+            strays=found["strays"],
         )
 
 
@@ -98,6 +109,7 @@ def solve_store(
     source: Source,
     params: Params,
     *,
+    sensors: Sensors | None = None,
     classify: bool = False,
     engine: EngineLike = None,
     resume: bool = False,
@@ -112,6 +124,8 @@ def solve_store(
         Exists; with Dask, at the same place for all workers.
     source : Source
     params : Params
+    sensors : Sensors, optional
+        Where sensors stood.
     classify : bool
         Also tell which points lie inside.
     engine : str, Engine or distributed.Client, optional
@@ -134,7 +148,12 @@ def solve_store(
         With `resume`: the folder holds work on another input or with other settings.
     """
     clock, report = Clock(progress), progress or (lambda stage, fraction: None)
-    key = store_key(source, params, classify)
+    if sensors is not None and sensors.seen_from is not None:
+        raise ValueError(
+            f"seen_from cannot be given for {source.count} points, which are solved in tiles: give viewpoints alone, "
+            "or a larger Params.tile_points"
+        )
+    key = store_key(source, params, classify, sensors)
     store = _found(folder, key) if resume else None
     points = tile_size(source.count, params)
     with make_engine(engine, params, points, source.count) as running:
@@ -143,6 +162,8 @@ def solve_store(
                 store, voxels = fill_store(folder, source, params, points, interior=classify, key=key, chunk=chunk)
             with clock("coarse"):
                 _solve_coarse(voxels, params, folder)
+            if sensors is not None:
+                store = dataclasses.replace(store, sensors=sensors.in_frame(store.frame))
             store.save()
         with clock("tiles"):
             _run(running, solve_tile, store, "field", "tiles", report)
@@ -198,12 +219,13 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
     Returns
     -------
     dict of str to (n, ...) array
-        "normals", "strength", "confidence", and "interior" where the store asks for it.
+        "normals", "strength", "confidence", "strays", and "interior" where the store asks for it.
     """
     kinds: dict[str, tuple[Any, tuple[int, ...]]] = {
         "normals": (store.dtype, (store.count, 3)),
         "strength": (store.dtype, (store.count,)),
         "confidence": (store.dtype, (store.count,)),
+        "strays": (np.bool_, (store.count,)),
     }
     if store.interior:
         kinds["interior"] = (np.bool_, (store.count,))
@@ -224,6 +246,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         out["normals"][row] = store.frame.unrotate(oriented["normals"])
         out["confidence"][row] = oriented["confidence"]
         out["strength"][row] = solved["strength"]
+        out["strays"][row] = solved["stray"]
         if store.interior:
             inside = solved["level"] < alpha
             out["interior"][row] = inside & oriented["enclosed"] if store.params.alpha == "auto" else inside

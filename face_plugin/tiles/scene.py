@@ -32,6 +32,7 @@ NEAR = 3.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
 SHARE = 0.2
 _SHEETS = tuple(field.name for field in dataclasses.fields(Sheets))
+_FIELD = tuple(field.name for field in dataclasses.fields(FieldAtPoints))
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Scene:
     field: FieldAtPoints
     own: NDArray[np.intp]
     """(k,) the row of each point that the tile owns."""
+    stray: NDArray[np.bool_]
+    """(n,) strays, which have no vote and do not move."""
     near: NDArray[np.bool_]
     """(n,) the tile's points, and those so near that their normals must be right for the tile's to be."""
     sheets: Sheets | None
@@ -51,16 +54,14 @@ class Scene:
 
 def write_far(store: Store) -> None:
     """Bring together what the first stage found out at the points of the coarse level."""
-    normals, strength, points = [], [], []
+    parts = []
     for tile in range(store.tiles):
-        found = store.read(tile, "field", "voxel_rows", "normals", "strength")
+        found = store.read(tile, "field", "voxel_rows", "stray", *_FIELD)
         rows = found["voxel_rows"]
-        points.append(store.voxels(tile))
-        normals.append(found["normals"][rows])
-        strength.append(found["strength"][rows])
-    store.write_whole(
-        "far", points=np.concatenate(points), normals=np.concatenate(normals), strength=np.concatenate(strength)
-    )
+        sound = ~found["stray"][rows]
+        values = {name: found[name][rows[sound]] for name in _FIELD}
+        parts.append({"points": store.voxels(tile)[sound], **values})
+    store.write_whole("far", **{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
 @lru_cache(maxsize=1)
@@ -101,7 +102,8 @@ def scene(store: Store, tile: int) -> Scene:
     kept = order[leads]
     moving = NEAR * near.spacing - reach
     inside = (points[kept] >= near.lower - moving) & (points[kept] <= near.upper + moving)
-    moves = np.asarray(inside.all(axis=1))
+    stray = np.concatenate([found["stray"].astype(np.bool_), np.zeros(len(beyond), dtype=np.bool_)])[kept]
+    moves = np.asarray(inside.all(axis=1)) & ~stray
 
     def everywhere(name: str) -> NDArray[np.float64]:
         return np.concatenate([found[name], far[name][beyond]])[kept]
@@ -111,8 +113,9 @@ def scene(store: Store, tile: int) -> Scene:
 
     return Scene(
         points[kept],
-        FieldAtPoints(everywhere("strength"), unit(everywhere("normals"))),
+        FieldAtPoints(everywhere("strength"), unit(everywhere("normals")), everywhere("difference")),
         place[near.own],
+        stray,
         moves,
         Sheets(*map(where_it_moves, _SHEETS)) if store.refines else None,
     )
@@ -120,7 +123,7 @@ def scene(store: Store, tile: int) -> Scene:
 
 def _of_tiles(store: Store, tile: NDArray[np.int64], row: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
     """Read what the first stage found out about points, given by the tiles (n,) that own them and their rows there."""
-    names = ("normals", "strength", *(_SHEETS if store.refines else ()))
+    names = (*_FIELD, "stray", *(_SHEETS if store.refines else ()))
     out: dict[str, NDArray[np.float64]] = {}
     for other in np.unique(tile):
         mine = tile == other

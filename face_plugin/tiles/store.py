@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 from face_plugin.cloud import Frame
 from face_plugin.io.disk import naming
 from face_plugin.params import Params
+from face_plugin.sides.sensors import Sensors
 
 __all__ = ["Store", "Subset"]
 
-VERSION = 2
+VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ class Store:
         Edge of the voxels of which the coarse level has a point each.
     plane : (3,) float64 or None
         The normal of a cloud that lies in one plane.
+    sensors : Sensors or None
+        Where sensors stood, in the canonical frame.
     """
 
     folder: Path
@@ -76,6 +79,7 @@ class Store:
     key: str
     voxel: float
     plane: NDArray[np.float64] | None = None
+    sensors: Sensors | None = None
 
     @property
     def tiles(self) -> int:
@@ -108,6 +112,7 @@ class Store:
                 "interior": self.interior,
                 "voxel": self.voxel,
                 "plane": None if self.plane is None else self.plane.tolist(),
+                "sensors": None if self.sensors is None else self.sensors.to_dict(),
             }
         )
         temporary = self.folder / f"store.{secrets.token_hex(4)}.tmp"
@@ -145,6 +150,7 @@ class Store:
             key=text["key"],
             voxel=text["voxel"],
             plane=None if text["plane"] is None else np.array(text["plane"]),
+            sensors=None if text["sensors"] is None else Sensors(**text["sensors"]),
         )
 
     def points(self, mode: Any = "r") -> NDArray[np.float64]:

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 from face_plugin.errors import MissingDependencyError, require
@@ -28,8 +27,11 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.confidence import confidence
 from face_plugin.sides.enclosure import enclosed
+from face_plugin.sides.sensors import sights
 from face_plugin.sides.sheets import find_sheets
+from face_plugin.sides.strays import find_strays
 from face_plugin.stages import Clock
+from face_plugin.threads import KDTree
 from face_plugin.tiles.coarse import Coarse
 from face_plugin.tiles.scene import scene
 from face_plugin.tiles.store import Store
@@ -108,8 +110,10 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         coarse = _coarse(store.folder, store.key)
         part = surroundings(store, tile, HALO)
         own = part.points[part.own]
+        stray = find_strays(Neighbourhood(part.points))
+        sound = part.points[~stray]
     solved = solve_field(
-        Neighbourhood(part.points),
+        Neighbourhood(sound),
         params,
         store.frame.scale,
         box=_box(part, params),
@@ -121,18 +125,22 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     with clock("field"):
         if store.refines:
             # The second stage needs them as well, and to look for them is a fifth of all work.
-            sheets = solved.sheets or find_sheets(Neighbourhood(part.points))
-            found = {name: values[part.own] for name, values in vars(sheets).items()}
+            sheets = solved.sheets or find_sheets(Neighbourhood(sound))
+            place = np.maximum(np.cumsum(~stray) - 1, 0)[part.own]
+            found = {name: values[place] for name, values in vars(sheets).items()}
         if store.interior:
             # Inside an isosurface is where the field is below its value, in the tile's box as everywhere.
             found["level"] = Locator(solved.cage.mesh).interpolate(own, solved.strength)
     with clock("normals"):
         seen = field_at_points(solved.cage.mesh, solved.strength, solved.cage.balls, own)
-        voxels = cKDTree(own).query(store.voxels(tile))[1]
+        voxels = KDTree(own).query(store.voxels(tile))[1]
     return {
         **found,
-        "strength": seen.strength,
+        # Strays are in no field: they have no vote.
+        "strength": np.where(stray[part.own], 0.0, seen.strength),
+        "stray": stray[part.own],
         "normals": seen.normals,
+        "difference": seen.difference,
         "voxel_rows": voxels,
         "seconds": _seconds(clock, TILE_STAGES),
         "balls": np.array([len(solved.cage.balls.radii), len(solved.cage.mesh.vertices)]),
@@ -166,13 +174,25 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         seen = scene(store, tile)
         around = Neighbourhood(seen.points)
     with clock("refine"):
-        normals = orient(around, seen.field, store.params, plane=store.plane, sheets=seen.sheets, moving=seen.near)
-    found: dict[str, NDArray[np.generic]] = {"normals": normals[seen.own]}
+        seen_by = None if store.sensors is None else sights(around, store.sensors)
+        normals = orient(
+            around, seen.field, store.params, plane=store.plane, sheets=seen.sheets, moving=seen.near, sights=seen_by
+        )
+        own, stray = seen.own, seen.stray[seen.own]
+        # A stray is given the normal of the nearest point that is none.
+        sound = np.flatnonzero(~seen.stray)
+        like = own.copy()
+        like[stray] = sound[KDTree(seen.points[sound]).query(seen.points[own[stray]])[1]]
+    found: dict[str, NDArray[np.generic]] = {"normals": normals[like]}
     with clock("enclosure"):
         if store.interior:
-            found["enclosed"] = enclosed(around, normals, seen.field.strength)[seen.own]
+            inside = enclosed(around, normals, seen.field.strength)
+            if seen_by is not None:
+                # What a sensor saw does not lie inside anything.
+                inside &= ~seen_by.any(axis=1)
+            found["enclosed"] = inside[own] & ~stray
     with clock("confidence"):
-        found["confidence"] = confidence(around, seen.field.votes, normals, seen.own)
+        found["confidence"] = np.where(stray, 0.0, confidence(around, seen.field.votes, normals, own))
     return {**found, "seconds": _seconds(clock, ORIENT_STAGES)}
 
 

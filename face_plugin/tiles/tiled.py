@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.params import Params
 from face_plugin.result import Result
+from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Progress
 from face_plugin.tiles.plan import EngineLike
 from face_plugin.tiles.run import estimate_tiled
@@ -24,6 +25,8 @@ class Tiled:
     ----------
     points : (n, 3) array_like of float or int, in any unit
     params : Params, optional
+    sensors : Sensors, optional
+        Where sensors stood; which of them saw which point cannot be given in tiles.
     classify : bool
         Classify the points in the pass for the normals: cheaper than another pass, if it will be asked for.
     engine : str, Engine or distributed.Client, optional
@@ -45,12 +48,14 @@ class Tiled:
         points: ArrayLike,
         params: Params | None = None,
         *,
+        sensors: Sensors | None = None,
         classify: bool = False,
         engine: EngineLike = None,
         progress: Progress | None = None,
     ) -> None:
         self.params = params or Params()
         self._points, self._classify, self._engine, self._progress = points, classify, engine, progress
+        self._sensors = sensors
         self._result: Result | None = None
 
     def result(self, *, filter_interior: bool = False) -> Result:
@@ -67,7 +72,17 @@ class Tiled:
         assert result.interior is not None  # it was asked for
         return result.interior
 
+    @property
+    def strays(self) -> NDArray[np.bool_]:
+        """Which points (n,) lie too far from everything to belong to a surface."""
+        return self.result().strays
+
     def _solve(self, params: Params, classify: bool) -> Result:
         return estimate_tiled(
-            self._points, params, filter_interior=classify, engine=self._engine, progress=self._progress
+            self._points,
+            params,
+            sensors=self._sensors,
+            filter_interior=classify,
+            engine=self._engine,
+            progress=self._progress,
         )

@@ -61,19 +61,22 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         **options,
     )
     result = surface.result
-    dropped = 0 if result.interior is None else int(result.interior.sum())
+    strays = int(result.strays.sum())
+    interior = 0 if result.interior is None else int(result.interior.sum())
+    kept = int(result.kept.sum())
     with console.stage("write"):
         write_mesh(output, surface.vertices, surface.faces)
         if side_output is not None:
-            keep = None if result.interior is None else ~result.interior
-            write_cloud(side_output, cloud, normals=result.normals, keep=keep)
+            write_cloud(side_output, cloud, normals=result.normals, keep=result.kept)
     closed = is_closed(surface.faces)
     summary = {
         "input": args.input,
         "output": output,
         "points": len(cloud),
-        "kept": len(cloud) - dropped,
-        "dropped": dropped,
+        "strays": strays,
+        "interior": interior,
+        "kept": kept,
+        "dropped": len(cloud) - kept,
         "vertices": len(surface.vertices),
         "faces": len(surface.faces),
         "closed": closed,
@@ -81,5 +84,6 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "params": result.params.to_dict(),
     }
     text = f"{output}: {len(surface.faces):,} triangles, {'closed' if closed else 'open'}, from "
-    text += f"{len(cloud) - dropped:,} of {len(cloud):,} points"
-    return summary, text + (f" ({dropped:,} inside the object left out)" if dropped else "")
+    text += f"{kept:,} of {len(cloud):,} points"
+    left_out = [f"{count:,} {what}" for count, what in ((interior, "inside the object"), (strays, "strays")) if count]
+    return summary, text + (f" ({', '.join(left_out)} left out)" if left_out else "")

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     inside = result.interior if result.interior is not None else np.zeros(len(cloud), dtype=np.bool_)
     if args.mark_interior:
         extra["interior"] = inside
-    keep = ~inside if args.filter_interior else None
+    keep = result.kept if args.filter_interior else None
     with console.stage("write"):
         write_cloud(output, cloud, normals=result.normals, extra=extra, keep=keep)
     written = len(cloud) if keep is None else int(keep.sum())
@@ -67,12 +67,13 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "output": output,
         "points": len(cloud),
         "written": written,
+        "strays": int(result.strays.sum()),
         "interior": int(inside.sum()) if wanted else None,
         "mean_confidence": float(result.confidence.mean()),
         "timings": result.timings,
         "params": result.params.to_dict(),
     }
-    dropped = f", {len(cloud) - written:,} interior points left out" if keep is not None else ""
+    dropped = f", {len(cloud) - written:,} interior points and strays left out" if keep is not None else ""
     return summary, f"{output}: {written:,} points with normals{dropped}"
 
 

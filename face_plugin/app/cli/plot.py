@@ -82,7 +82,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     summary = {"input": args.input, "output": output, "points": len(points)}
     if args.interior and result.interior is not None:
         meshes = []
-        for keep in (slice(None), ~result.interior):
+        for keep in (slice(None), result.kept):
             with console.stage("surface"):
                 meshes.append(poisson_reconstruction(points[keep], result.normals[keep], **options)[:2])
         with console.stage("draw"):

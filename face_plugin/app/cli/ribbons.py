@@ -79,7 +79,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         if side_output is not None:
             write_normals(side_output, sketch, normals_at_vertices(sketch, samples, result.normals))
     count = len(samples.points)
-    dropped = 0 if result.interior is None else int(result.interior.sum())
+    dropped = count - int(result.kept.sum())
     closed = is_closed(surface.faces)
     summary = {
         "input": args.input,

@@ -111,6 +111,7 @@ def _main(argv: Sequence[str] | None, heard: list[int]) -> int:
 def _run(args: argparse.Namespace, console: Console, heard: list[int]) -> int:
     from face_plugin.errors import FaceError, MissingDependencyError
 
+    console.heard = heard
     try:
         summary, text = args.run(args, console)
         console.report(summary, text)

@@ -25,6 +25,7 @@ class Console:
         self._write = write
         self._start = time.perf_counter()
         self._bars: Bars | None = None
+        self.heard: list[int] = []
 
     def __enter__(self) -> Console:
         """Start to show log messages and warnings."""
@@ -57,6 +58,9 @@ class Console:
 
     def progress(self, stage: str, fraction: float) -> None:
         """Show a stage: the callback that the library takes."""
+        if self.heard:
+            # It was told to stop, and the exception that should have done it was dropped.
+            raise KeyboardInterrupt
         if self.quiet:
             return
         if self._bars is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,7 +26,8 @@ class Terminated(BaseException):
 def listening() -> Iterator[list[int]]:
     """Let SIGINT and SIGTERM raise; yield the list of those that came.
 
-    Libraries that are interrupted while they load make other exceptions of it: the list tells.
+    Libraries that are interrupted while they load make other exceptions of it, and Python drops those that are raised
+    while it frees an object: the list tells.
     """
     heard: list[int] = []
     if threading.current_thread() is not threading.main_thread():
@@ -37,6 +39,11 @@ def listening() -> Iterator[list[int]]:
         heard.append(number)
         raise KeyboardInterrupt if number == signal.SIGINT else Terminated
 
+    def dropped(info: sys.UnraisableHookArgs) -> None:
+        if not isinstance(info.exc_value, (KeyboardInterrupt, Terminated)):
+            hook(info)
+
+    hook, sys.unraisablehook = sys.unraisablehook, dropped
     previous = {signal.SIGTERM: signal.signal(signal.SIGTERM, stop)}
     # Shells start what runs in the background with interrupts ignored.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -44,5 +51,6 @@ def listening() -> Iterator[list[int]]:
     try:
         yield heard
     finally:
+        sys.unraisablehook = hook
         for number, handler in previous.items():
             signal.signal(number, handler)

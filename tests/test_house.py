@@ -12,6 +12,7 @@ ROOMS = [
     "io",
     "shapes",
     "ribbons",
+    "examples",
     "faraday",
     "sides",
     "angles",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["build_parser", "main"]
 
-COMMANDS = ("normals", "mesh", "ribbons", "info", "plot", "view", "chain", "script")
+COMMANDS = ("normals", "mesh", "ribbons", "info", "plot", "view", "chain", "script", "example")
 
 FAILED, BAD_INPUT, MISSING = 1, 2, 3
 EXIT_CODES = """exit codes:

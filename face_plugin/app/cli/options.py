@@ -39,7 +39,7 @@ def add_command(
     help: str,
     *,
     output: str | None = None,
-    inputs: str = "point cloud",
+    inputs: str | None = "point cloud",
     suffixes: tuple[str, ...] = READ_SUFFIXES,
 ) -> argparse.ArgumentParser:
     """Add a subcommand with what all of them have: the input, the output, and how much to say.
@@ -53,15 +53,16 @@ def add_command(
         Takes the arguments and the `Console`; returns the summary for ``--json`` and the text for a reader.
     output : str, optional
         What ``-o`` writes; None: nothing.
-    inputs : str
-        What the input is.
+    inputs : str, optional
+        What the input is; None: there is none.
     suffixes : tuple of str
         Extensions that it may have.
     """
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=help, description=help, epilog="exit codes: see face --help"
     )
-    parser.add_argument("input", metavar="IN", type=Path, help=f"{inputs} ({', '.join(suffixes)})")
+    if inputs is not None:
+        parser.add_argument("input", metavar="IN", type=Path, help=f"{inputs} ({', '.join(suffixes)})")
     if output is not None:
         parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help=output)
     parser.add_argument("--json", action="store_true", help="print a summary as JSON, and nothing else, on stdout")

@@ -1,0 +1,143 @@
+"""What users scan: rooms from inside, terrain, crates sampled at random, bores, strays, noise."""
+
+import numpy as np
+
+from face_plugin import estimate_normals, examples, shapes
+
+
+def right(normals, truth):
+    """Share of normals on the right side."""
+    return float((np.einsum("nd,nd->n", normals, truth) > 0).mean())
+
+
+def rectangle(corner, one, other, n, rng):
+    """Points at random on a rectangle, with the normal `one` x `other`."""
+    corner, one, other = (np.asarray(v, dtype=float) for v in (corner, one, other))
+    normal = np.cross(one, other)
+    area = np.linalg.norm(normal)
+    count = round(n * area)
+    share = rng.random((count, 2))
+    return corner + share[:, :1] * one + share[:, 1:] * other, np.tile(normal / area, (count, 1))
+
+
+def box_faces(lower, upper, n, rng, *, sides=range(6), hollow=False):
+    """Faces of a box, `n` points a unit of area; sides 0 to 5 are -x, +x, -y, +y, -z, +z."""
+    lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    found = []
+    for side in sides:
+        axis, high = divmod(side, 2)
+        edges = np.diag(upper - lower)
+        one, other = edges[(axis + 1) % 3], edges[(axis + 2) % 3]
+        corner = lower + high * edges[axis]
+        points, normals = rectangle(corner, *((one, other) if high else (other, one)), n, rng)
+        found.append((points, -normals if hollow else normals))
+    return found
+
+
+def joined(parts):
+    points, normals = zip(*parts, strict=True)
+    return np.concatenate(points), np.concatenate(normals)
+
+
+def crate(density, seed):
+    """Open box with walls of 0.06 whose mouth is as wide as half its depth, sampled at random."""
+    rng = np.random.default_rng(seed)
+    outer, inner = ((0.0, 0.0, 0.0), (1.0, 0.8, 0.7)), ((0.06, 0.06, 0.06), (0.94, 0.74, 0.7))
+    parts = box_faces(*outer, density, rng, sides=range(5)) + box_faces(
+        *inner, density, rng, sides=range(5), hollow=True
+    )
+    # The rim: four strips between the two mouths.
+    for lower, upper in (
+        ((0, 0, 0.7), (1, 0.06, 0.7)),
+        ((0, 0.74, 0.7), (1, 0.8, 0.7)),
+        ((0, 0.06, 0.7), (0.06, 0.74, 0.7)),
+        ((0.94, 0.06, 0.7), (1, 0.74, 0.7)),
+    ):
+        width, depth = upper[0] - lower[0], upper[1] - lower[1]
+        parts.append(rectangle(lower, (width, 0, 0), (0, depth, 0), density, rng))
+    return joined(parts)
+
+
+def drilled(n, seed):
+    """Block of 2 x 1 x 1 with three bores of diameter 0.3 right through it, spread evenly."""
+    rng = np.random.default_rng(seed)
+    density = shapes.sampling.OVERSAMPLING * n / 10.0
+    points, normals = joined(box_faces((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), density, rng))
+    parts = []
+    in_a_bore = np.zeros(len(points), dtype=bool)
+    for x in (0.4, 1.0, 1.6):
+        in_a_bore |= np.hypot(points[:, 0] - x, points[:, 1] - 0.5) < 0.15
+        count = round(density * 2 * np.pi * 0.15)
+        turn, height = rng.random((2, count)) * [[2 * np.pi], [1.0]]
+        around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(count)])
+        parts.append((np.column_stack([x + 0.15 * around[:, 0], 0.5 + 0.15 * around[:, 1], height]), -around))
+    points, normals = joined([(points[~in_a_bore], normals[~in_a_bore]), *parts])
+    kept = shapes.evenly(points, n, rng, normals=normals)
+    return points[kept], normals[kept]
+
+
+def test_a_room_with_its_viewpoints_faces_inward_and_loses_nothing():
+    room = examples.load("room", 4000)
+    result = estimate_normals(room.points, viewpoints=room.viewpoints, filter_interior=True)
+    assert right(result.normals, room.normals) >= 0.995
+    assert (~result.kept).mean() <= 0.005
+
+
+def test_which_viewpoint_saw_which_point_may_be_told():
+    room = examples.load("room", 2000)
+    # The scan lists the points of the first viewpoint first; of some it is not known.
+    seen_from = (np.arange(2000) >= 1000).astype(int)
+    seen_from[::7] = -1
+    result = estimate_normals(room.points, viewpoints=room.viewpoints, seen_from=seen_from)
+    assert right(result.normals, room.normals) >= 0.995
+
+
+def test_terrain_seen_from_above_points_up():
+    terrain = examples.load("terrain", 3000)
+    up = estimate_normals(terrain.points, up=terrain.up).normals
+    assert right(up, terrain.normals) >= 0.995
+    down = estimate_normals(terrain.points, up=-terrain.up).normals
+    assert right(down, terrain.normals) <= 0.005
+
+
+def test_terrain_without_a_hint_has_one_side():
+    terrain = examples.load("terrain", 3000)
+    share = right(estimate_normals(terrain.points).normals, terrain.normals)
+    assert max(share, 1.0 - share) >= 0.99
+
+
+def test_a_crate_sampled_at_random_is_right_inside_and_loses_nothing():
+    points, normals = crate(1200, 0)
+    result = estimate_normals(points, filter_interior=True)
+    assert right(result.normals, normals) >= 0.99
+    assert (~result.kept).mean() <= 0.01
+
+
+def test_strays_around_a_sphere_are_set_aside_and_nothing_is_lost():
+    count = 3000
+    shape = shapes.with_outliers(shapes.sphere(count), 0.01, seed=3)
+    result = estimate_normals(shape.points, filter_interior=True)
+    assert result.kept[:count].all()
+    assert right(result.normals[:count], shape.normals[:count]) == 1.0
+    # Those that happen to lie on the sphere are no strays.
+    off = np.abs(np.linalg.norm(shape.points[count:], axis=1) - 1.0) > 0.25
+    assert result.strays[count:][off].mean() >= 0.9
+
+
+def test_bores_are_right_and_kept():
+    points, normals = drilled(5000, 0)
+    result = estimate_normals(points, filter_interior=True)
+    bore = (np.abs(normals[:, 2]) < 1e-9) & (np.abs(points[:, 1] - 0.5) < 0.16) & (points[:, 0] > 0.2)
+    bore &= points[:, 0] < 1.8
+    assert bore.sum() > 500
+    assert right(result.normals, normals) >= 0.99
+    assert right(result.normals[bore], normals[bore]) >= 0.99
+    assert (~result.kept).mean() <= 0.01
+
+
+def test_a_noisy_sphere_loses_next_to_nothing():
+    count = 3000
+    # Noise of half a spacing: the square root of the area a point.
+    shape = shapes.with_noise(shapes.sphere(count), 0.5 * np.sqrt(4 * np.pi / count), seed=1)
+    result = estimate_normals(shape.points, filter_interior=True)
+    assert (~result.kept).mean() <= 0.01

@@ -1,0 +1,107 @@
+"""On which side are the normals? Four kinds of scan, without a hint and with one; wrong sides are red.
+
+    python examples/which_side.py [--points N] [--only NAME ...] [--out FOLDER]
+
+The scans are generated (face_plugin.examples). Pictures: which_side_NAME.png, and which_side.png of room and street.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import open3d as o3d
+from panels import aligned, save_panels
+from PIL import Image
+from scipy.spatial import cKDTree
+
+import face_plugin
+from face_plugin import examples
+from face_plugin.app.plot import Camera, render_points
+from face_plugin.shapes import sphere
+
+RIGHT, WRONG, SENSOR = (0.45, 0.6, 0.8), (0.85, 0.2, 0.15), (1.0, 0.75, 0.0)
+VIEWS = {
+    "room": (-65.0, 50.0),
+    "terrain": (-60.0, 35.0),
+    "street": (-75.0, 40.0),
+    "frame": (200.0, 25.0),
+}
+# A room is looked into from above: what is higher is not drawn.
+CEILING = {"room": 2.3}
+BALL = sphere(60).points
+
+
+def by_tangent_planes(points: Any) -> Any:
+    """Open3D's own two calls."""
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.estimate_normals()
+    cloud.orient_normals_consistent_tangent_plane(15)
+    return np.asarray(cloud.normals)
+
+
+def image(name: str, scan: Any, normals: Any) -> Any:
+    """Points as discs, blue where they face free space; sensors are yellow."""
+    shown = scan.points[:, 2] < CEILING.get(name, np.inf)
+    wrong = (normals * scan.normals).sum(axis=1) < 0
+    radius = 0.75 * float(np.median(cKDTree(scan.points).query(scan.points, k=5)[0][:, 1:].mean(axis=1)))
+    drawn, paint, across = [scan.points[shown]], [np.where(wrong[:, None], WRONG, RIGHT)[shown]], [normals[shown]]
+    if scan.viewpoints is not None:
+        size = 0.02 * float(np.ptp(scan.points, axis=0).max())
+        for place in scan.viewpoints:
+            drawn.append(place + size * BALL)
+            paint.append(np.tile(SENSOR, (len(BALL), 1)))
+            across.append(BALL)
+    points = np.concatenate(drawn)
+    camera = Camera.around(points, view=VIEWS[name])
+    return render_points(
+        points, np.concatenate(paint), radius=radius, normals=np.concatenate(across), camera=camera, size=380
+    )
+
+
+def hint(scan: Any) -> dict[str, Any]:
+    return {"up": scan.up} if scan.viewpoints is None else {"viewpoints": scan.viewpoints}
+
+
+def save(path: Path, panels: list[tuple[str, Any]]) -> None:
+    """Write a picture in a hundred colours: a third of the bytes."""
+    save_panels(path, panels)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(100)
+    small.save(path, optimize=True)
+
+
+def panels_of(name: str, points: int) -> list[tuple[str, Any]]:
+    scan = examples.load(name, points)
+    told = hint(scan)
+    tried = [("Open3D, tangent planes", by_tangent_planes(scan.points))]
+    tried.append(("FaCE, no hint", face_plugin.estimate_normals(scan.points).normals))
+    tried.append((f"FaCE, {next(iter(told))}=", face_plugin.estimate_normals(scan.points, **told).normals))
+    panels = []
+    for title, normals in tried:
+        share = aligned(normals, scan.normals)
+        print(f"{name}: {title}: {share:.1f} % right")
+        panels.append((f"{name}: {title}\n{share:.1f} % on the right side", image(name, scan, normals)))
+    return panels
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--points", type=int, default=examples.POINTS)
+    parser.add_argument("--only", nargs="*", choices=list(VIEWS), default=list(VIEWS))
+    parser.add_argument("--out", type=Path, default=Path("."))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    found = {}
+    for name in args.only:
+        found[name] = panels_of(name, args.points)
+        save(args.out / f"which_side_{name}.png", found[name])
+    if {"room", "street"} <= set(found):
+        chosen = [found[name][k] for name in ("room", "street") for k in (0, -1)]
+        save(args.out / "which_side.png", chosen)
+
+
+if __name__ == "__main__":
+    main()

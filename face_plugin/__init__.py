@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from face_plugin.errors import FaceError, MeshingError, MissingDependencyError
-    from face_plugin.estimate import estimate_normals, reconstruct
+    from face_plugin.estimate import estimate_normals, orient_normals, reconstruct
     from face_plugin.params import Params
     from face_plugin.result import Result, Surface
     from face_plugin.solver import FaCE
@@ -31,6 +31,7 @@ __all__ = [
     "Result",
     "Surface",
     "estimate_normals",
+    "orient_normals",
     "reconstruct",
 ]
 
@@ -43,6 +44,7 @@ _HOME = {
     "Result": "result",
     "Surface": "result",
     "estimate_normals": "estimate",
+    "orient_normals": "estimate",
     "reconstruct": "estimate",
 }
 

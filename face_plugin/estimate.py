@@ -6,12 +6,14 @@ import dataclasses
 import os
 import time
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
-from face_plugin.params import Params
+from face_plugin.params import Params, checked
 from face_plugin.result import Result, Surface, kept_points
 from face_plugin.sculpt import SculptFile
+from face_plugin.sides.given import checked_trust, given_lines
 from face_plugin.sides.sensors import Sensors, sensors_of
 from face_plugin.solver import FaCE
 from face_plugin.stages import Progress
@@ -19,7 +21,7 @@ from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
 from face_plugin.tiles.plan import EngineLike, check_one_piece, in_tiles
 from face_plugin.tiles.tiled import Tiled
 
-__all__ = ["estimate_normals", "reconstruct", "solve", "solve_whole"]
+__all__ = ["estimate_normals", "orient_normals", "reconstruct", "solve", "solve_whole"]
 
 
 def solve(
@@ -48,8 +50,8 @@ def solve(
     >>> type(solve(sphere(500).points)).__name__
     'FaCE'
     """
-    array = cloud.as_points(points)
-    if in_tiles(len(array), params or Params()):
+    array, given = cloud.as_points(points), checked(params)
+    if in_tiles(len(array), given):
         return Tiled(array, params, sensors=sensors, classify=classify, engine=engine, progress=progress)
     return FaCE(array, params, sensors=sensors, progress=progress)
 
@@ -79,7 +81,7 @@ def solve_whole(
         There is not the memory for it.
     """
     array = cloud.as_points(points)
-    check_one_piece(len(array), params or Params(), purpose)
+    check_one_piece(len(array), checked(params), purpose)
     return FaCE(array, params, sensors=sensors, progress=progress)
 
 
@@ -148,6 +150,58 @@ def estimate_normals(
         sculpt = SculptFile.load(sculpt)
     face = solve_whole(points, params, purpose="sculpting", sensors=sensors, progress=progress)
     return face.sculpted(sculpt).result(filter_interior=filter_interior)
+
+
+def orient_normals(
+    points: ArrayLike,
+    normals: ArrayLike,
+    params: Params | None = None,
+    *,
+    viewpoints: ArrayLike | None = None,
+    seen_from: ArrayLike | None = None,
+    up: ArrayLike | None = None,
+    trusted: ArrayLike | None = None,
+    engine: EngineLike = None,
+    progress: Progress | None = None,
+) -> NDArray[np.floating]:
+    """Turn the signs of normals that are given, so that they point outward; their lines stay as they are.
+
+    Parameters
+    ----------
+    points, params, viewpoints, seen_from, up, engine, progress
+        As in `estimate_normals`, whose normals tell the side of each line; it is then settled along sheets.
+    normals : (n, 3) array_like
+        Of any length but 0 and of either sign.
+    trusted : (n,) array_like of bool, optional
+        Normals that stay as they are, and whose side is handed on along the sheets that they are part of.
+
+    Returns
+    -------
+    (n, 3) array
+        In the floating-point type of `normals`; each row is that of `normals`, or its negative.
+
+    Raises
+    ------
+    ValueError
+        Bad input; the message names the argument, what was found and what is allowed.
+    MeshingError
+        The space between the box and the balls could not be meshed.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> mixed = ball.normals.copy()
+    >>> mixed[::2] *= -1
+    >>> bool((orient_normals(ball.points, mixed) == ball.normals).all())
+    True
+    """
+    array, sensors = cloud.as_points(points), sensors_of(viewpoints, seen_from, up)
+    # Bad normals are said before the cage is solved.
+    given_lines(normals, len(array))
+    checked_trust(trusted, len(array))
+    solved = solve(array, params, sensors=sensors, engine=engine, progress=progress)
+    return solved.oriented(normals, trusted)
 
 
 def reconstruct(

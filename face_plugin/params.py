@@ -8,7 +8,7 @@ import numbers
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
-__all__ = ["ALPHAS", "Params"]
+__all__ = ["ALPHAS", "Params", "checked"]
 
 Alpha = Literal["auto", "dense", "sparse"]
 
@@ -156,6 +156,27 @@ class Params:
     def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, for JSON."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def checked(params: Params | None) -> Params:
+    """Return the settings, the default ones for None.
+
+    Raises
+    ------
+    TypeError
+        It is something else, such as a dict.
+
+    Examples
+    --------
+    >>> checked(None) == Params()
+    True
+    """
+    if params is None:
+        return Params()
+    if not isinstance(params, Params):
+        hint = ": pass face_plugin.Params(**settings)" if isinstance(params, dict) else ""
+        raise TypeError(f"params must be a face_plugin.Params or None, found {type(params).__name__}{hint}")
+    return params
 
 
 def _integer(params: Params, name: str, least: int) -> None:

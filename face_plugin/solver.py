@@ -23,6 +23,7 @@ from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence
+from face_plugin.sides.given import checked_trust, given_lines, sides_of_lines
 from face_plugin.sides.sensors import Sensors, sights
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.strays import find_strays, without
@@ -166,6 +167,17 @@ class FaCE(Sculptable):
     def normals(self) -> NDArray[np.floating]:
         """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
         return self.frame.unrotate(self._reading.normals)[self.cloud.rows].astype(self.cloud.dtype)
+
+    def oriented(self, normals: ArrayLike, trusted: ArrayLike | None = None) -> NDArray[np.floating]:
+        """Turn the signs of normals (n, 3) that are given, as `face_plugin.orient_normals` does."""
+        given, lines = given_lines(normals, self.cloud.size)
+        trust, rows, lines = checked_trust(trusted, self.cloud.size), self.cloud.rows, self.frame.rotate(lines)
+        reading = self._reading
+        # What a sensor saw is certain, whatever the field says.
+        sure = reading.confidence if reading.sights is None else np.where(reading.sights.any(1), 1, reading.confidence)
+        evidence = np.einsum("nd,nd->n", lines, reading.normals[rows]) * np.where(self.strays, 0.0, sure[rows])
+        side = sides_of_lines(reading.around, rows, lines, evidence, trust)
+        return np.where(side[:, None] < 0, -given, given)
 
     def potential(self) -> NDArray[np.float64]:
         """Potentials (m, 3) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.params import Params
 from face_plugin.result import Result
+from face_plugin.sides.given import checked_trust, given_lines
 from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Progress
 from face_plugin.tiles.plan import EngineLike
@@ -71,6 +72,21 @@ class Tiled:
         result = self.result(filter_interior=True) if params == self.params else self._solve(params, True)
         assert result.interior is not None  # it was asked for
         return result.interior
+
+    def oriented(self, normals: ArrayLike, trusted: ArrayLike | None = None) -> NDArray[np.floating]:
+        """Turn the signs of normals (n, 3) that are given, as `face_plugin.orient_normals` does.
+
+        Raises
+        ------
+        ValueError
+            Some are trusted: what they say is handed on in one piece only.
+        """
+        result = self.result()
+        given, lines = given_lines(normals, len(result.normals))
+        if checked_trust(trusted, len(lines)) is not None:
+            raise ValueError("trusted needs the cloud in one piece: a larger Params.tile_points or max_memory")
+        side = np.einsum("nd,nd->n", lines, result.normals)
+        return np.where(side[:, None] < 0, -given, given)
 
     @property
     def strays(self) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from face_plugin.errors import FaceError
 from face_plugin.filters.base import Filter
 from face_plugin.filters.interior import Interior
-from face_plugin.filters.normals import Normals
+from face_plugin.filters.normals import Normals, with_sensors
 from face_plugin.filters.pointset import PointSet
 from face_plugin.filters.sculpt import Sculpt
 from face_plugin.filters.surface import Surface
@@ -65,6 +65,9 @@ class Chain(Filter):
             From a step, with its number (from 1) and name in front.
         """
         asked = layer.classify
+        # Steps before the normals see the same sensors, and share their cage.
+        said = [step.sensors for step in self.steps if isinstance(step, Normals) and step.sensors is not None]
+        layer = with_sensors(layer, said[0] if said else None)
         for number, step in enumerate(self.steps, 1):
             ahead = any(isinstance(later, Interior) for later in self.steps[number - 1 :])
             try:

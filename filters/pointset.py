@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from face_plugin.cloud import as_points
 from face_plugin.estimate import solve
 from face_plugin.params import Params
+from face_plugin.sides.sensors import Sensors
 from face_plugin.solver import FaCE
 from face_plugin.stages import Progress
 from face_plugin.tiles import Tiled
@@ -49,6 +50,8 @@ class PointSet:
     surface : Mesh, optional
     cage : FaCE or Tiled, optional
         The solved cage of the kept points, so that steps share one solve.
+    sensors : Sensors, optional
+        Where sensors stood, for every cage that is solved.
     classify : bool
         Whether a later step will ask for interior points; a large cloud is then classified in the same pass.
 
@@ -72,6 +75,7 @@ class PointSet:
     surface: Mesh | None = None
     cage: FaCE | Tiled | None = None
     classify: bool = False
+    sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
         points = as_points(self.points)
@@ -104,7 +108,7 @@ class PointSet:
         return len(self.points)
 
     def replace(self, **changes: Any) -> PointSet:
-        """Return a copy with other fields; the solved cage goes when the kept points change.
+        """Return a copy with other fields; the solved cage goes when the kept points or the sensors change.
 
         Examples
         --------
@@ -112,7 +116,7 @@ class PointSet:
         >>> PointSet(np.eye(3)).replace(keep=[True, False, True]).keep.tolist()
         [True, False, True]
         """
-        if {"points", "keep"} & changes.keys():
+        if {"points", "keep", "sensors"} & changes.keys():
             changes.setdefault("cage", None)
         return dataclasses.replace(self, **changes)
 
@@ -124,13 +128,15 @@ class PointSet:
             attributes={name: values[self.keep] for name, values in self.attributes.items()},
             surface=self.surface,
             cage=self.cage,
+            sensors=None if self.sensors is None else self.sensors.of(self.keep),
         )
 
     def solved(self, params: Params | None = None, progress: Progress | None = None) -> FaCE | Tiled:
         """Return the cage of the kept points: the one at hand, unless `params` asks for another."""
         if self.cage is not None and (params is None or params == self.cage.params):
             return self.cage
-        return solve(self.points[self.keep], params, classify=self.classify, progress=progress)
+        sensors = None if self.sensors is None else self.sensors.of(self.keep)
+        return solve(self.points[self.keep], params, sensors=sensors, classify=self.classify, progress=progress)
 
     def scatter(self, values: NDArray[Any]) -> NDArray[Any]:
         """Spread values of the kept points over all n rows; the other rows are zero."""

@@ -63,7 +63,9 @@ class Sculpt(Filter):
         cage = layer.solved(self.params, progress)
         if not isinstance(cage, FaCE):
             # Edits need the one mesh that they are made in, whatever its size.
-            cage = solve_whole(layer.points[layer.keep], cage.params, purpose="sculpting", progress=progress)
+            cage = solve_whole(
+                layer.points[layer.keep], cage.params, purpose="sculpting", sensors=layer.sensors, progress=progress
+            )
         return layer.replace(cage=cage.sculpted(self.file))
 
 

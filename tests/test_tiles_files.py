@@ -49,7 +49,7 @@ def test_every_pair_of_formats(suffix, output, ball, expected, tmp_path):
         "interior": inside,
     }
     # Three parts of different length.
-    parts = columns_of(opened, found, ["strength", "interior"], drop_interior=False, chunk=1000)
+    parts = columns_of(opened, found, ["strength", "interior"], keep=None, chunk=1000)
     WRITERS[output](target, COUNT, parts, opened)
     written = read_cloud(target)
     step = 1e-8 if ".la" in suffix + output else 0.0
@@ -62,7 +62,7 @@ def test_every_pair_of_formats(suffix, output, ball, expected, tmp_path):
         if suffix != ".npy":
             assert np.allclose(written.attributes["quality"], attributes()["quality"], rtol=1e-6)
             assert np.array_equal(written.attributes["intensity"], attributes()["intensity"])
-    kept = columns_of(opened, found, [], drop_interior=True, chunk=1000)
+    kept = columns_of(opened, found, [], keep=~inside, chunk=1000)
     WRITERS[output](target, int((~inside).sum()), kept, opened)
     assert np.allclose(read_cloud(target).points, read.points[~inside], rtol=0, atol=step)
 
@@ -75,7 +75,7 @@ def test_colours_of_las_become_bytes_in_every_part(factor, ball, tmp_path):
     write_cloud(tmp_path / "in.las", CloudFile(ball.points, attributes=given))
     opened = open_source(tmp_path / "in.las")
     # The first part is black: it does not say whether the colours have 8 bits or 16.
-    parts = columns_of(opened, {"normals": ball.normals}, [], drop_interior=False, chunk=1000)
+    parts = columns_of(opened, {"normals": ball.normals}, [], keep=None, chunk=1000)
     WRITERS[".ply"](tmp_path / "out.ply", COUNT, parts, opened)
     written = read_cloud(tmp_path / "out.ply").attributes
     for name, values in colours.items():

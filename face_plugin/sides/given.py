@@ -112,7 +112,7 @@ def sides_of_lines(
     assert len(found) == count  # every distinct point came from the input
     line = lines[speaker]
     alike = np.where(np.einsum("nd,nd->n", lines, line[rows]) < 0, -1.0, 1.0)
-    weight = np.bincount(rows, alike * evidence, minlength=count)
+    weight = np.bincount(rows, alike * evidence, minlength=count).astype(np.float64)
     if trusted is not None:
         weight *= BESIDE_TRUST
         weight[rows[trusted]] = TRUST

@@ -93,6 +93,19 @@ class Sensors:
         fields = {"viewpoints": self.viewpoints, "seen_from": self.seen_from, "up": self.up}
         return {name: None if value is None else np.asarray(value).tolist() for name, value in fields.items()}
 
+    def of(self, kept: NDArray[np.bool_]) -> Sensors:
+        """Return those of the points (n,) that are kept."""
+        if self.seen_from is None or kept.all():
+            return self
+        return Sensors(self.viewpoints, self._rows(len(kept))[kept], self.up)
+
+    def _rows(self, count: int) -> NDArray[np.intp]:
+        """Rows of the viewpoints, one for each of so many points."""
+        rows = np.asarray(self.seen_from)
+        if len(rows) != count:
+            raise ValueError(f"seen_from must have a row for each of the {count} points, found {len(rows)}")
+        return rows
+
     def in_frame(self, frame: Frame, rows: NDArray[np.intp] | None = None) -> Sensors:
         """Return them in the canonical frame; `rows` (n,) tells which distinct point each input point became."""
         viewpoints, up, seen_from = self.viewpoints, self.up, self.seen_from
@@ -101,9 +114,7 @@ class Sensors:
         if up is not None:
             up = frame.rotate(np.asarray(up)[None])[0]
         if seen_from is not None and rows is not None:
-            given = np.asarray(seen_from)
-            if len(given) != len(rows):
-                raise ValueError(f"seen_from must have a row for each of the {len(rows)} points, found {len(given)}")
+            given = self._rows(len(rows))
             distinct = np.full(int(rows.max()) + 1, -1, dtype=np.intp)
             distinct[rows[given >= 0]] = given[given >= 0]
             seen_from = distinct

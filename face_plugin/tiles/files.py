@@ -19,6 +19,7 @@ from face_plugin.io.disk import claimed
 from face_plugin.io.sinks import WRITERS, Columns
 from face_plugin.io.sources import STREAMED, Source, open_source
 from face_plugin.params import Params
+from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Progress
 from face_plugin.tiles.plan import PROCESS_BYTES, EngineLike, allowed_memory
 from face_plugin.tiles.run import collect, solve_store
@@ -46,6 +47,8 @@ class FileResult:
     """Points written."""
     interior: int | None
     """Points inside the object, where they were classified."""
+    strays: int
+    """Points too far from everything to belong to a surface."""
     mean_confidence: float
     timings: dict[str, float]
     """Seconds by stage."""
@@ -75,6 +78,7 @@ def normals_of_file(
     output: str | os.PathLike[str],
     params: Params | None = None,
     *,
+    sensors: Sensors | None = None,
     filter_interior: bool = False,
     mark_interior: bool = False,
     scalars: bool = False,
@@ -93,8 +97,10 @@ def normals_of_file(
         NPY, binary PLY, LAS or LAZ, of the same kind or not. The point attributes are kept where the
         output's format can hold them; other elements of a PLY, such as faces, are not.
     params : Params, optional
+    sensors : Sensors, optional
+        Where sensors stood, in the unit of the points.
     filter_interior : bool
-        Leave out the points inside the object.
+        Leave out the points inside the object, and strays.
     mark_interior : bool
         Write whether each point is inside, as ``interior`` (0 or 1).
     scalars : bool
@@ -136,14 +142,24 @@ def normals_of_file(
     interior = filter_interior or mark_interior
     with _working(folder, output, resume):
         store, timings = solve_store(
-            folder, opened, params, classify=interior, engine=engine, resume=resume, progress=progress, chunk=chunk
+            folder,
+            opened,
+            params,
+            sensors=sensors,
+            classify=interior,
+            engine=engine,
+            resume=resume,
+            progress=progress,
+            chunk=chunk,
         )
         report("write", 0.0)
         found = collect(store, folder)
         inside = int(np.count_nonzero(found["interior"])) if interior else None
-        written = opened.count - (inside or 0 if filter_interior else 0)
+        strays = int(np.count_nonzero(found["strays"]))
+        keep = ~np.asarray(found["interior"] | found["strays"]) if filter_interior else None
+        written = opened.count if keep is None else int(np.count_nonzero(keep))
         extra = [name for name, wanted in _extras(scalars, mark_interior) if wanted]
-        parts = columns_of(opened, found, extra, drop_interior=filter_interior, chunk=chunk)
+        parts = columns_of(opened, found, extra, keep=keep, chunk=chunk)
         with replacing(output) as temporary:
             WRITERS[output.suffix.lower()](temporary, written, parts, opened)
         mean_confidence = float(found["confidence"].mean())
@@ -154,6 +170,7 @@ def normals_of_file(
         points=opened.count,
         written=written,
         interior=inside,
+        strays=strays,
         mean_confidence=mean_confidence,
         timings=timings,
         params=params,
@@ -186,7 +203,7 @@ def _extras(scalars: bool, mark_interior: bool) -> list[tuple[str, bool]]:
 
 
 def columns_of(
-    source: Source, found: dict[str, NDArray[Any]], extra: list[str], *, drop_interior: bool, chunk: int
+    source: Source, found: dict[str, NDArray[Any]], extra: list[str], *, keep: NDArray[np.bool_] | None, chunk: int
 ) -> Iterator[Columns]:
     """Yield the columns to write, `chunk` points of the input at a time.
 
@@ -197,7 +214,8 @@ def columns_of(
         As `face_plugin.tiles.run.collect` gives it.
     extra : list of str
         Names of what is to be written beside the normals.
-    drop_interior : bool
+    keep : (n,) bool or None
+        Points to write; None: all.
     chunk : int
     """
     seen = 0
@@ -209,8 +227,7 @@ def columns_of(
         for name in extra:
             values = found[name][part]
             columns[name] = values.astype(np.uint8) if values.dtype == np.bool_ else values
-        if drop_interior:
-            keep = ~found["interior"][part]
-            columns = {name: values[keep] for name, values in columns.items()}
+        if keep is not None:
+            columns = {name: values[keep[part]] for name, values in columns.items()}
         seen += len(points)
         yield columns

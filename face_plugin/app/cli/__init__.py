@@ -83,13 +83,14 @@ def _main(argv: Sequence[str] | None, heard: list[int]) -> int:
     from typing import TextIO, cast
 
     from face_plugin.app.cli.console import Console
+    from face_plugin.app.cli.sensors import joined
     from face_plugin.app.cli.streams import Unfailing, fill_closed, guarded_stdout, settle_stdout
 
     fill_closed()
     with redirect_stderr(cast(TextIO, Unfailing(sys.stderr))):
         try:
             try:
-                args = build_parser().parse_args(argv)
+                args = build_parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
             except SystemExit as stop:
                 # argparse has said what was wrong (2), or printed its help or version (0).
                 settle_stdout()

@@ -8,6 +8,7 @@ from typing import Any
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command
+from face_plugin.app.cli.sensors import own_viewpoints
 from face_plugin.io import (
     CLOUD_SUFFIXES,
     MESH_SUFFIXES,
@@ -38,14 +39,17 @@ def register(commands: Any) -> None:
 
 def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str]:
     """Run the chain and write what it leaves."""
-    from face_plugin.filters import Chain, PointSet, Surface
+    from face_plugin.filters import Chain, Normals, PointSet, Surface
+    from face_plugin.sides.sensors import sensors_of
 
     chain = Chain.load(args.input)
     meshed = any(isinstance(step, Surface) for step in chain.steps)
     output = check_output(args.output, MESH_SUFFIXES if meshed else CLOUD_SUFFIXES)
     with console.stage("read"):
         cloud = read_cloud(args.cloud)
-    layer = chain(PointSet(cloud.points, cloud.normals), progress=console.progress)
+    said = any(isinstance(step, Normals) and step.sensors is not None for step in chain.steps)
+    sensors = None if said else sensors_of(own_viewpoints(cloud, console))
+    layer = chain(PointSet(cloud.points, cloud.normals, sensors=sensors), progress=console.progress)
     kept = int(layer.keep.sum())
     with console.stage("write"):
         if layer.surface is not None:

@@ -6,16 +6,22 @@ import argparse
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command
+from face_plugin.cloud import prepare
 from face_plugin.io import CloudFile, read_cloud
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.strays import find_strays
 from face_plugin.threads import KDTree
 
 __all__ = ["register"]
 
 # Distances are measured from at most so many points, evenly taken: a median needs no more.
 SAMPLE = 100_000
+# Strays are told by all neighbours of all points: about a second a million of them, and two gigabytes.
+MOST_JUDGED = 1_000_000
 
 
 def register(commands: Any) -> None:
@@ -53,10 +59,22 @@ def describe(cloud: CloudFile) -> dict[str, Any]:
         "upper": None if high is None else high.tolist(),
         "diagonal": None if low is None or high is None else float(np.linalg.norm(high - low)),
         "spacing": spacing,
+        "strays": _strays(points),
         "normals": cloud.normals is not None,
         "viewpoints": None if cloud.viewpoints is None else len(cloud.viewpoints),
         "attributes": {name: str(values.dtype) for name, values in cloud.attributes.items()},
     }
+
+
+def _strays(points: NDArray[np.float64]) -> int | None:
+    """Count the points too far from everything; None where they are too many to count in a moment, or no body."""
+    if len(points) > MOST_JUDGED:
+        return None
+    try:
+        prepared = prepare(points)
+    except ValueError:
+        return None
+    return int(find_strays(Neighbourhood(prepared.points))[prepared.rows].sum())
 
 
 def _text(value: Any) -> str:

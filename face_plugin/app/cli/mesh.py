@@ -16,6 +16,7 @@ from face_plugin.app.cli.options import (
     params_of,
     surface_of,
 )
+from face_plugin.app.cli.sensors import add_sensors, sensors_in
 from face_plugin.io import CLOUD_SUFFIXES, MESH_SUFFIXES, check_output, read_cloud, write_cloud, write_mesh
 from face_plugin.surface import is_closed
 
@@ -40,6 +41,7 @@ def register(commands: Any) -> None:
     add_interior(parser, default=True)
     add_sculpt(parser)
     add_surface(parser)
+    add_sensors(parser)
     add_method(parser)
 
 
@@ -56,6 +58,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         cloud.points,
         params,
         filter_interior=args.filter_interior,
+        **sensors_in(args, console, cloud),
         sculpt=args.sculpt,
         progress=console.progress,
         **options,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command, add_interior, add_method, add_sculpt, params_of
+from face_plugin.app.cli.sensors import add_sensors, sensors_in
 from face_plugin.io import CLOUD_SUFFIXES, check_output, read_cloud, write_cloud
 from face_plugin.params import Params
 
@@ -34,6 +35,7 @@ def register(commands: Any) -> None:
         help="keep tiles on disk, and go on from those of an interrupted run (npy, ply, las, laz)",
     )
     add_sculpt(parser)
+    add_sensors(parser)
     add_method(parser)
 
 
@@ -50,7 +52,12 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         cloud = read_cloud(args.input)
     wanted = args.filter_interior or args.mark_interior
     result = estimate_normals(
-        cloud.points, params, filter_interior=wanted, sculpt=args.sculpt, progress=console.progress
+        cloud.points,
+        params,
+        filter_interior=wanted,
+        **sensors_in(args, console, cloud),
+        sculpt=args.sculpt,
+        progress=console.progress,
     )
     extra: dict[str, NDArray[Any]] = {}
     if args.scalars:
@@ -81,12 +88,14 @@ def _in_parts(args: argparse.Namespace, params: Params, console: Console) -> tup
     """Estimate and write the normals of a file that is never held as a whole."""
     if args.sculpt is not None:
         raise ValueError("--sculpt needs the cloud in one piece: more --max-memory, and no --resume")
+    from face_plugin.sides.sensors import sensors_of
     from face_plugin.tiles.files import normals_of_file
 
     done = normals_of_file(
         args.input,
         args.output,
         params,
+        sensors=sensors_of(**sensors_in(args, console)),
         filter_interior=args.filter_interior,
         mark_interior=args.mark_interior,
         scalars=args.scalars,
@@ -98,10 +107,11 @@ def _in_parts(args: argparse.Namespace, params: Params, console: Console) -> tup
         "output": args.output,
         "points": done.points,
         "written": done.written,
+        "strays": done.strays,
         "interior": done.interior,
         "mean_confidence": done.mean_confidence,
         "timings": done.timings,
         "params": params.to_dict(),
     }
-    dropped = f", {done.points - done.written:,} interior points left out" if args.filter_interior else ""
+    dropped = f", {done.points - done.written:,} interior points and strays left out" if args.filter_interior else ""
     return summary, f"{args.output}: {done.written:,} points with normals{dropped}"

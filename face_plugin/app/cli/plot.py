@@ -7,6 +7,7 @@ from typing import Any
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command, add_method, add_sculpt, add_surface, params_of, surface_of
+from face_plugin.app.cli.sensors import add_sensors, sensors_in
 from face_plugin.io import check_output, read_cloud
 from face_plugin.params import ALPHAS, Params
 
@@ -41,6 +42,7 @@ def register(commands: Any) -> None:
     parser.add_argument("--title", help="title of the picture [default: the name of the file]")
     add_sculpt(parser)
     add_surface(parser)
+    add_sensors(parser, up="--seen-up")
     add_method(parser)
 
 
@@ -57,6 +59,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     from face_plugin.app import plot
     from face_plugin.errors import require
     from face_plugin.estimate import estimate_normals, solve_whole
+    from face_plugin.sides.sensors import sensors_of
     from face_plugin.surface import poisson_reconstruction
 
     output = check_output(args.output, plot.PLOT_SUFFIXES)
@@ -64,12 +67,15 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     require("matplotlib", extra="plot")
     params, options = params_of(args), surface_of(args)
     with console.stage("read"):
-        points = read_cloud(args.input).points
+        cloud = read_cloud(args.input)
+    points, seen = cloud.points, sensors_in(args, console, cloud)
     if args.interior and args.sculpt is None:
-        result = estimate_normals(points, params, filter_interior=True, progress=console.progress)
+        result = estimate_normals(points, params, filter_interior=True, **seen, progress=console.progress)
     else:
         # A slice shows the field between the points.
-        face = solve_whole(points, params, purpose="a slice of the field", progress=console.progress)
+        face = solve_whole(
+            points, params, purpose="a slice of the field", sensors=sensors_of(**seen), progress=console.progress
+        )
         if args.sculpt is not None:
             face = face.sculpted(args.sculpt)
         result = face.result(filter_interior=args.interior)

@@ -16,6 +16,7 @@ from face_plugin.app.cli.options import (
     params_of,
     surface_of,
 )
+from face_plugin.app.cli.sensors import add_sensors, sensors_in
 from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
 from face_plugin.surface import is_closed
 
@@ -50,6 +51,7 @@ def register(commands: Any) -> None:
     add_interior(parser, default=True)
     add_sculpt(parser)
     add_surface(parser)
+    add_sensors(parser)
     add_method(parser)
 
 
@@ -69,6 +71,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         samples.points,
         params,
         filter_interior=args.filter_interior,
+        **sensors_in(args, console),
         sculpt=args.sculpt,
         progress=console.progress,
         **surface_of(args),

@@ -14,11 +14,13 @@ import logging
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from face_plugin.errors import MissingDependencyError, require
 from face_plugin.estimate import reconstruct
 from face_plugin.filters import Normals, PointSet
 from face_plugin.params import Params
+from face_plugin.sides.sensors import sensors_of
 
 __all__ = ["FaceAccessor", "register", "unregister"]
 
@@ -47,7 +49,15 @@ class FaceAccessor:
     def __init__(self, dataset: Any) -> None:
         self._dataset = dataset
 
-    def estimate_normals(self, params: Params | None = None, *, inplace: bool = False) -> Any:
+    def estimate_normals(
+        self,
+        params: Params | None = None,
+        *,
+        inplace: bool = False,
+        viewpoints: ArrayLike | None = None,
+        seen_from: ArrayLike | None = None,
+        up: ArrayLike | None = None,
+    ) -> Any:
         """Give the points outward unit normals, as the active normals, named "Normals" as PyVista's own.
 
         Parameters
@@ -55,6 +65,8 @@ class FaceAccessor:
         params : Params, optional
         inplace : bool
             Change the dataset, or return a copy, as PyVista's filters do.
+        viewpoints, seen_from, up
+            Where sensors stood, as in `face_plugin.estimate_normals`.
 
         Returns
         -------
@@ -67,7 +79,8 @@ class FaceAccessor:
             Points that are not finite, or fewer than four distinct ones.
         """
         result = self._dataset if inplace else self._dataset.copy()
-        normals = Normals(params)(PointSet(np.asarray(result.points))).normals
+        layer = PointSet(np.asarray(result.points), sensors=sensors_of(viewpoints, seen_from, up))
+        normals = Normals(params)(layer).normals
         result.point_data["Normals"] = np.array(normals)
         result.point_data.active_normals_name = "Normals"
         return result
@@ -79,7 +92,7 @@ class FaceAccessor:
         ----------
         params : Params, optional
         **options
-            Those of `face_plugin.reconstruct`: depth, screened, filter_interior, backend, trim, progress.
+            Those of `face_plugin.reconstruct`, such as depth, filter_interior, viewpoints, up.
 
         Returns
         -------
@@ -103,7 +116,8 @@ def register() -> bool:
     if not hasattr(pyvista, "register_dataset_accessor"):
         log.info("PyVista %s has no dataset accessors: FaceAccessor(dataset) serves", pyvista.__version__)
         return False
-    if getattr(pyvista.DataSet, NAME, None) is None:
+    # Not getattr: while it registers entry points, PyVista 0.49 would look this one up again, and find none.
+    if NAME not in vars(pyvista.DataSet):
         pyvista.register_dataset_accessor(NAME, pyvista.DataSet)(FaceAccessor)
     return True
 
@@ -114,7 +128,7 @@ def unregister() -> None:
         pyvista = require("pyvista", extra="pyvista")
     except MissingDependencyError:
         return
-    if getattr(pyvista.DataSet, NAME, None) is not None:
+    if NAME in vars(pyvista.DataSet):
         pyvista.unregister_dataset_accessor(NAME, pyvista.DataSet)
 
 

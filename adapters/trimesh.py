@@ -1,4 +1,4 @@
-"""trimesh: `PointCloud` and `Trimesh` (its vertices) wherever an array of points would do."""
+"""trimesh: `PointCloud`, `Trimesh` (its vertices) and `Scene` wherever an array of points would do."""
 
 from __future__ import annotations
 
@@ -16,7 +16,14 @@ __all__ = ["estimate_normals", "points_of", "reconstruct"]
 
 
 def points_of(geometry: Any) -> NDArray[Any]:
-    """Return the points of a `PointCloud`, the vertices of a `Trimesh`, or an array as it is.
+    """Return the points of a `PointCloud`, the vertices of a `Trimesh`, those of a `Scene`, or an array as it is.
+
+    A scene's are those of its geometries one after the other, in the order of ``scene.dump()``, in its own frame.
+
+    Raises
+    ------
+    ValueError
+        A scene without points.
 
     Examples
     --------
@@ -24,6 +31,11 @@ def points_of(geometry: Any) -> NDArray[Any]:
     >>> points_of(trimesh.creation.box()).shape
     (8, 3)
     """
+    if hasattr(geometry, "dump") and hasattr(geometry, "graph"):
+        parts = [np.asarray(part.vertices) for part in geometry.dump() if hasattr(part, "vertices")]
+        if not parts:
+            raise ValueError("the scene must hold a geometry with points, found none")
+        return np.concatenate(parts)
     return np.asarray(getattr(geometry, "vertices", geometry))
 
 
@@ -32,7 +44,7 @@ def estimate_normals(geometry: Any, params: Params | None = None, **options: Any
 
     Parameters
     ----------
-    geometry : trimesh.PointCloud, trimesh.Trimesh or (n, 3) array_like
+    geometry : trimesh.PointCloud, trimesh.Trimesh, trimesh.Scene or (n, 3) array_like
     params : Params, optional
     **options
         As in `face_plugin.estimate_normals`.
@@ -52,7 +64,7 @@ def reconstruct(geometry: Any, params: Params | None = None, **options: Any) -> 
 
     Parameters
     ----------
-    geometry : trimesh.PointCloud, trimesh.Trimesh or (n, 3) array_like
+    geometry : trimesh.PointCloud, trimesh.Trimesh, trimesh.Scene or (n, 3) array_like
     params : Params, optional
     **options
         As in `face_plugin.reconstruct`.

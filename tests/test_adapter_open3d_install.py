@@ -11,7 +11,12 @@ o3d = pytest.importorskip("open3d")
 
 SHAPE = disjoint_spheres(800)
 CLOUDS = (o3d.geometry.PointCloud, o3d.t.geometry.PointCloud)
-NAMES = ("estimate_normals", "orient_normals_consistent_tangent_plane")
+NAMES = (
+    "estimate_normals",
+    "orient_normals_consistent_tangent_plane",
+    "orient_normals_towards_camera_location",
+    "orient_normals_to_align_with_direction",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -63,26 +68,30 @@ def test_a_tensor_script_too():
         pcd.estimate_normals()
 
 
-def test_normals_from_elsewhere_are_still_oriented_by_open3d():
-    expected, pcd = legacy(), legacy()
-    mixed = SHAPE.normals * np.where(np.arange(800) % 2, 1, -1)[:, None]
-    for cloud in (expected, pcd):
-        cloud.normals = o3d.utility.Vector3dVector(mixed)
-    expected.orient_normals_consistent_tangent_plane(15)
-    with installed():
-        pcd.orient_normals_consistent_tangent_plane(15)
-    assert np.array_equal(np.asarray(pcd.normals), np.asarray(expected.normals))
-
-
-def test_normals_that_open3d_estimated_before_or_after_are_its_own_to_orient():
-    pcd = legacy()
-    with installed():
+@pytest.mark.parametrize("make", [legacy, tensor])
+def test_normals_that_are_consistent_already_are_not_solved_again(make, caplog):
+    pcd = make()
+    with installed(), caplog.at_level("DEBUG", logger="face_plugin.adapters.open3d"):
         pcd.estimate_normals()
-    pcd.normals = o3d.utility.Vector3dVector()
-    pcd.estimate_normals()
+        pcd.orient_normals_consistent_tangent_plane(15)
+        assert caplog.text.count("skipped") == 1
+        # Unless a script changed them in between.
+        if make is tensor:
+            pcd.point.normals[:100] *= -1
+        else:
+            np.asarray(pcd.normals)[:100] *= -1
+        pcd.orient_normals_consistent_tangent_plane(15)
+        assert caplog.text.count("skipped") == 1
+    assert outward(pcd.point.normals.numpy() if make is tensor else np.asarray(pcd.normals)) == 1.0
+
+
+def test_normals_from_elsewhere_keep_their_lines():
+    pcd = legacy()
+    mixed = SHAPE.normals * np.where(np.arange(800) % 2, 1, -1)[:, None]
+    pcd.normals = o3d.utility.Vector3dVector(mixed)
     with installed():
         pcd.orient_normals_consistent_tangent_plane(15)
-    assert outward(np.asarray(pcd.normals)) < 0.75
+    assert np.array_equal(np.asarray(pcd.normals), SHAPE.normals)
 
 
 def test_settings_of_install_reach_the_method():

@@ -135,7 +135,17 @@ def test_a_file_in_parts_has_sensors_and_strays(tmp_path: Path, capfd: pytest.Ca
     source, out = saved(tmp_path, points), tmp_path / "out.ply"
     settings = ("--tile-points", 1500, "--engine", "serial")
     code, text, _ = run(
-        capfd, "normals", source, "-o", out, "--resume", "--filter-interior", "--json", "--viewpoint", "0,0.1,0", *settings
+        capfd,
+        "normals",
+        source,
+        "-o",
+        out,
+        "--resume",
+        "--filter-interior",
+        "--json",
+        "--viewpoint",
+        "0,0.1,0",
+        *settings,
     )
     summary = json.loads(text)
     assert code == 0

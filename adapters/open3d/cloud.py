@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import logging
+import os
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.errors import require
+from face_plugin.filters import PointSet
+from face_plugin.filters.sculpt import sculpted
+from face_plugin.params import Params
+from face_plugin.sides.sensors import sensors_of
 
-__all__ = ["is_empty", "is_tensor", "points_of", "select", "set_normals"]
+__all__ = ["is_empty", "is_tensor", "layer_of", "normals_of", "points_of", "select", "set_normals"]
 
 log = logging.getLogger(__name__)
 
@@ -21,7 +26,15 @@ def is_tensor(pcd: Any) -> bool:
 
 
 def points_of(pcd: Any) -> NDArray[Any]:
-    """Positions (n, 3) in the dtype of the cloud, without a copy where they are in the memory of the host."""
+    """Positions (n, 3) in the dtype of the cloud, without a copy where they are in the memory of the host.
+
+    Raises
+    ------
+    TypeError
+        It is no point cloud; the message says how to make one.
+    """
+    if type(pcd).__name__ != "PointCloud":
+        raise TypeError(f"pcd must be an Open3D PointCloud, found {type(pcd).__name__}{_remedy(pcd)}")
     if not is_tensor(pcd):
         return np.asarray(pcd.points)
     if "positions" not in pcd.point:
@@ -30,12 +43,49 @@ def points_of(pcd: Any) -> NDArray[Any]:
     return array
 
 
+def _remedy(found: Any) -> str:
+    if isinstance(found, (np.ndarray, list, tuple)):
+        return (
+            ": pass open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points)), "
+            "or the array to face_plugin.estimate_normals"
+        )
+    if type(found).__name__ == "TriangleMesh":
+        return ": pass points of it, such as mesh.sample_points_poisson_disk(20000)"
+    return ""
+
+
+def normals_of(pcd: Any) -> NDArray[Any]:
+    """Return the normals (n, 3) of the cloud, in its dtype.
+
+    Raises
+    ------
+    RuntimeError
+        It has none, as of Open3D's own.
+    """
+    has = "normals" in pcd.point if is_tensor(pcd) else pcd.has_normals()
+    if not has:
+        raise RuntimeError("No normals in the PointCloud. Call estimate_normals() first.")
+    return np.asarray(pcd.point.normals.cpu().numpy() if is_tensor(pcd) else pcd.normals)
+
+
 def is_empty(pcd: Any) -> bool:
     """Whether there is nothing to do, which is worth a warning and no more: a script goes on."""
-    if pcd.is_empty() or len(points_of(pcd)) == 0:
+    if len(points_of(pcd)) == 0:
         log.warning("the point cloud is empty: nothing to do")
         return True
     return False
+
+
+def layer_of(
+    pcd: Any,
+    sculpt: str | os.PathLike[str] | None,
+    params: Params | None,
+    viewpoints: ArrayLike | None,
+    seen_from: ArrayLike | None,
+    up: ArrayLike | None,
+) -> PointSet:
+    """Points of the cloud for a chain of steps, with the sensors and the edits of a sculpt file."""
+    return sculpted(PointSet(points_of(pcd), sensors=sensors_of(viewpoints, seen_from, up)), sculpt, params)
 
 
 def set_normals(pcd: Any, normals: NDArray[Any] | None) -> None:

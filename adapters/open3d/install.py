@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import logging
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
+from face_plugin.adapters.open3d import orient
+from face_plugin.adapters.open3d.cloud import normals_of, points_of
 from face_plugin.adapters.open3d.points import estimate_normals
 from face_plugin.errors import require
-from face_plugin.params import Params
+from face_plugin.params import Params, checked
 
 __all__ = ["install", "installed", "uninstall"]
 
@@ -18,14 +24,16 @@ log = logging.getLogger(__name__)
 
 _originals: dict[tuple[type, str], Any] = {}
 _params: Params | None = None
-_oriented: weakref.WeakSet[Any] = weakref.WeakSet()
+# Clouds whose normals point outward already, and what their points and normals were then.
+_outward: weakref.WeakKeyDictionary[Any, bytes] = weakref.WeakKeyDictionary()
 
 
 def install(params: Params | None = None) -> None:
-    """Make ``pcd.estimate_normals(...)`` of both Open3D APIs call FaCE, until `uninstall`.
+    """Make Open3D's methods for normals call FaCE, of both its APIs, until `uninstall`.
 
-    A following ``pcd.orient_normals_consistent_tangent_plane(k)`` of the same cloud does nothing, since its
-    normals are consistent; of any other cloud it is Open3D's own. Installing again only changes `params`.
+    These are ``estimate_normals``, ``orient_normals_consistent_tangent_plane``,
+    ``orient_normals_towards_camera_location`` and ``orient_normals_to_align_with_direction``. The second does nothing
+    to normals that FaCE has just estimated, since they are consistent. Installing again only changes `params`.
 
     Parameters
     ----------
@@ -43,19 +51,20 @@ def install(params: Params | None = None) -> None:
     >>> uninstall()
     """
     global _params
-    _params = params
+    _params = None if params is None else checked(params)
     if _originals:
         return
     o3d = require("open3d", extra="open3d")
-    for cloud in (o3d.geometry.PointCloud, o3d.t.geometry.PointCloud):
-        tensor = cloud is o3d.t.geometry.PointCloud
-        for name, make in (
-            ("estimate_normals", _tensor_estimate if tensor else _legacy_estimate),
-            ("orient_normals_consistent_tangent_plane", _orient),
+    for cloud, estimate in ((o3d.geometry.PointCloud, _legacy_estimate), (o3d.t.geometry.PointCloud, _tensor_estimate)):
+        for name, method in (
+            ("estimate_normals", estimate),
+            ("orient_normals_consistent_tangent_plane", _consistent),
+            ("orient_normals_towards_camera_location", _towards),
+            ("orient_normals_to_align_with_direction", _align),
         ):
             # From the class's own dictionary: what is put back there must be the same object.
-            _originals[cloud, name] = cloud.__dict__[name]
-            setattr(cloud, name, make(_originals[cloud, name]))
+            original = _originals[cloud, name] = cloud.__dict__[name]
+            setattr(cloud, name, _in_place_of(original, name, method))
 
 
 def uninstall() -> None:
@@ -64,7 +73,7 @@ def uninstall() -> None:
     for (cloud, name), original in _originals.items():
         setattr(cloud, name, original)
     _originals.clear()
-    _oriented.clear()
+    _outward.clear()
     _params = None
 
 
@@ -93,35 +102,45 @@ def installed(params: Params | None = None) -> Iterator[None]:
 
 def _estimate(pcd: Any, **arguments: Any) -> None:
     estimate_normals(pcd, **arguments, params=_params)
-    _oriented.add(pcd)
+    if len(points_of(pcd)):
+        _outward[pcd] = _digest(pcd)
 
 
-def _legacy_estimate(original: Any) -> Callable[..., None]:
-    def estimate_normals(self: Any, search_param: Any = None, fast_normal_computation: bool = True) -> None:
-        _estimate(self, search_param=search_param, fast_normal_computation=fast_normal_computation)
-
-    return _named_like(estimate_normals, original)
+def _legacy_estimate(self: Any, search_param: Any = None, fast_normal_computation: bool = True) -> None:
+    _estimate(self, search_param=search_param, fast_normal_computation=fast_normal_computation)
 
 
-def _tensor_estimate(original: Any) -> Callable[..., None]:
-    def estimate_normals(self: Any, max_nn: int | None = 30, radius: float | None = None) -> None:
-        _estimate(self, max_nn=None if max_nn == 30 else max_nn, radius=radius)
-
-    return _named_like(estimate_normals, original)
+def _tensor_estimate(self: Any, max_nn: int | None = 30, radius: float | None = None) -> None:
+    _estimate(self, max_nn=None if max_nn == 30 else max_nn, radius=radius)
 
 
-def _orient(original: Any) -> Callable[..., None]:
-    def orient_normals_consistent_tangent_plane(
-        self: Any, k: int, lambda_penalty: float = 0.0, cos_alpha_tol: float = 1.0
-    ) -> None:
-        if self in _oriented:
-            log.debug("orient_normals_consistent_tangent_plane(%s) skipped: FaCE's normals are consistent", k)
-        else:
-            original(self, k, lambda_penalty, cos_alpha_tol)
-
-    return _named_like(orient_normals_consistent_tangent_plane, original)
+def _consistent(self: Any, k: int, lambda_penalty: float = 0.0, cos_alpha_tol: float = 1.0) -> None:
+    if self in _outward and _outward[self] == _digest(self):
+        log.debug("orient_normals_consistent_tangent_plane(%s) skipped: FaCE's normals are consistent", k)
+    else:
+        orient.orient_normals_consistent_tangent_plane(self, k, lambda_penalty, cos_alpha_tol, params=_params)
 
 
-def _named_like(method: Callable[..., None], original: Any) -> Callable[..., None]:
-    method.__doc__ = f"FaCE in place of the host's method, while installed.\n\n{original.__doc__}"
-    return method
+def _towards(self: Any, camera_location: Any = (0.0, 0.0, 0.0)) -> None:
+    orient.orient_normals_towards_camera_location(self, camera_location, params=_params)
+
+
+def _align(self: Any, orientation_reference: Any = (0.0, 0.0, 1.0)) -> None:
+    orient.orient_normals_to_align_with_direction(self, orientation_reference, params=_params)
+
+
+def _digest(pcd: Any) -> bytes:
+    """Fingerprint of the points and normals, which a script may change in between."""
+    digest = hashlib.blake2b(np.ascontiguousarray(points_of(pcd)).data)
+    digest.update(np.ascontiguousarray(normals_of(pcd)).data)
+    return digest.digest()
+
+
+def _in_place_of(original: Any, name: str, method: Callable[..., None]) -> Callable[..., None]:
+    @functools.wraps(method)
+    def replacement(*args: Any, **kwargs: Any) -> None:
+        method(*args, **kwargs)
+
+    replacement.__name__ = name
+    replacement.__doc__ = f"FaCE in place of the host's method, while installed.\n\n{original.__doc__}"
+    return replacement

@@ -7,10 +7,10 @@ import os
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from face_plugin.adapters.open3d.cloud import is_empty, points_of, select, set_normals
-from face_plugin.filters import Interior, Normals, PointSet
-from face_plugin.filters.sculpt import sculpted
+from face_plugin.adapters.open3d.cloud import is_empty, layer_of, points_of, select, set_normals
+from face_plugin.filters import Interior, Normals
 from face_plugin.params import Params
 
 __all__ = ["estimate_normals", "remove_interior_points"]
@@ -25,6 +25,9 @@ def estimate_normals(
     *,
     max_nn: int | None = None,
     radius: float | None = None,
+    viewpoints: ArrayLike | None = None,
+    seen_from: ArrayLike | None = None,
+    up: ArrayLike | None = None,
     params: Params | None = None,
     sculpt: str | os.PathLike[str] | None = None,
 ) -> None:
@@ -40,12 +43,16 @@ def estimate_normals(
         Of a tensor cloud, dtype and device are kept.
     search_param, fast_normal_computation, max_nn, radius
         Those of ``PointCloud.estimate_normals`` in the two APIs; FaCE has no use for them and logs that.
+    viewpoints, seen_from, up
+        Where sensors stood, as in `face_plugin.estimate_normals`.
     params : Params, optional
     sculpt : path, optional
         File of charges and cage points, as of ``face mesh --sculpt``.
 
     Raises
     ------
+    TypeError
+        `pcd` is no point cloud, or `params` no `Params`; the message says what to pass.
     ValueError
         Points that are not finite, or too few; or an edit is refused.
 
@@ -68,7 +75,7 @@ def estimate_normals(
         log.debug("FaCE has no use for %s", ", ".join(name for name, is_given in given.items() if is_given))
     if is_empty(pcd):
         return
-    layer = sculpted(PointSet(points_of(pcd)), sculpt, params)
+    layer = layer_of(pcd, sculpt, params, viewpoints, seen_from, up)
     set_normals(pcd, Normals(params)(layer).normals)
 
 
@@ -76,10 +83,13 @@ def remove_interior_points(
     pcd: Any,
     alpha: float | str | None = None,
     *,
+    viewpoints: ArrayLike | None = None,
+    seen_from: ArrayLike | None = None,
+    up: ArrayLike | None = None,
     params: Params | None = None,
     sculpt: str | os.PathLike[str] | None = None,
 ) -> tuple[Any, Any]:
-    """Drop the points inside the object; colours, covariances and attributes follow those that are kept.
+    """Drop the points inside the object, and strays; colours, covariances and attributes follow those that are kept.
 
     Parameters
     ----------
@@ -87,7 +97,7 @@ def remove_interior_points(
         Stays as it is.
     alpha : float or {"auto", "dense", "sparse"}, optional
         Field strength below which space counts as inside, as in `Params`.
-    params, sculpt
+    viewpoints, seen_from, up, params, sculpt
         As in `estimate_normals`.
 
     Returns
@@ -108,5 +118,5 @@ def remove_interior_points(
     """
     keep = np.ones(len(points_of(pcd)), dtype=np.bool_)
     if not is_empty(pcd):
-        keep = Interior(alpha, params)(sculpted(PointSet(points_of(pcd)), sculpt, params)).keep
+        keep = Interior(alpha, params)(layer_of(pcd, sculpt, params, viewpoints, seen_from, up)).keep
     return select(pcd, keep)

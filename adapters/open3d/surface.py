@@ -6,12 +6,12 @@ import os
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from face_plugin.adapters.open3d.cloud import is_tensor, points_of
+from face_plugin.adapters.open3d.cloud import is_tensor, layer_of
 from face_plugin.errors import require
-from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
-from face_plugin.filters.sculpt import sculpted
+from face_plugin.filters import Chain, Filter, Interior, Normals, Surface
 from face_plugin.params import Params
 
 __all__ = ["create_from_point_cloud_face"]
@@ -24,6 +24,9 @@ def create_from_point_cloud_face(
     screened: bool = True,
     filter_interior: bool = True,
     trim: float = 0.0,
+    viewpoints: ArrayLike | None = None,
+    seen_from: ArrayLike | None = None,
+    up: ArrayLike | None = None,
     params: Params | None = None,
     sculpt: str | os.PathLike[str] | None = None,
 ) -> tuple[Any, Any]:
@@ -33,7 +36,7 @@ def create_from_point_cloud_face(
     ----------
     pcd : open3d.geometry.PointCloud or open3d.t.geometry.PointCloud
         Stays as it is; normals that it has are not used.
-    depth, screened, filter_interior, trim, params
+    depth, screened, filter_interior, trim, viewpoints, seen_from, up, params
         As in `face_plugin.reconstruct`.
     sculpt : path, optional
         File of charges and cage points, as of ``face mesh --sculpt``.
@@ -57,7 +60,7 @@ def create_from_point_cloud_face(
     o3d = require("open3d", extra="open3d")
     middle: list[Filter] = [Interior()] if filter_interior else []
     chain = Chain([Normals(params), *middle, Surface(depth, screened, "open3d", trim)])
-    layer = chain(sculpted(PointSet(points_of(pcd)), sculpt, params))
+    layer = chain(layer_of(pcd, sculpt, params, viewpoints, seen_from, up))
     surface = layer.surface
     assert surface is not None  # the chain ends with it
     mesh = o3d.geometry.TriangleMesh(

@@ -8,19 +8,22 @@ In a pipeline::
 
 Settings, since PDAL passes none to a function that is imported::
 
-    "source": "import face_plugin.adapters.pdal as face; step = face.configured(cage_spacing=0.5)"
+    "source": "import face_plugin.adapters.pdal as face; step = face.configured(always_up=True, cage_spacing=0.5)"
 """
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable, Mapping, MutableMapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet
 from face_plugin.params import Params
+from face_plugin.sides.sensors import Sensors, sensors_of
 
 __all__ = ["configured", "estimate_normals", "remove_interior"]
 
@@ -76,7 +79,12 @@ def remove_interior(ins: Dimensions, outs: MutableMapping[str, NDArray[Any]]) ->
 
 
 def configured(
-    *, normals: bool = True, interior: bool = False, **settings: Any
+    *,
+    normals: bool = True,
+    interior: bool = False,
+    viewpoint: str | ArrayLike | None = None,
+    always_up: bool = False,
+    **settings: Any,
 ) -> Callable[[Dimensions, MutableMapping[str, NDArray[Any]]], bool]:
     """Make a function for ``filters.python`` with other settings.
 
@@ -85,7 +93,11 @@ def configured(
     normals : bool
         Write normals.
     interior : bool
-        Drop interior points.
+        Drop interior points and strays.
+    viewpoint : str or (3,) or (k, 3) array_like, optional
+        Where the scanner stood, as of PDAL's ``filters.normal``: a point in WKT or GeoJSON, or an array of one or more.
+    always_up : bool
+        All was seen from above, as in most aerial scans; unlike ``filters.normal`` not by default.
     **settings
         Fields of `face_plugin.Params`.
 
@@ -93,21 +105,37 @@ def configured(
     --------
     >>> step = configured(interior=True, alpha="sparse")
     """
-    params = Params(**settings)
+    params, sensors = Params(**settings), sensors_of(_position(viewpoint), None, (0, 0, 1) if always_up else None)
     steps: list[Filter] = [Normals(params)] if normals else []
     chain = Chain([*steps, Interior(params=params)] if interior else steps)
 
     def step(ins: Dimensions, outs: MutableMapping[str, NDArray[Any]]) -> bool:
-        return _run(ins, outs, chain)
+        return _run(ins, outs, chain, sensors)
 
     return step
 
 
-def _run(ins: Dimensions, outs: MutableMapping[str, NDArray[Any]], step: Filter) -> bool:
+def _position(viewpoint: str | ArrayLike | None) -> ArrayLike | None:
+    """Coordinates of a point in WKT or GeoJSON; anything else as it is."""
+    if not isinstance(viewpoint, str):
+        return viewpoint
+    found = re.fullmatch(r"\s*POINT\s*Z?\s*\(([^()]+)\)\s*", viewpoint, re.IGNORECASE)
+    try:
+        numbers = [float(word) for word in found[1].split()] if found else json.loads(viewpoint)["coordinates"]
+    except (ValueError, KeyError, TypeError):
+        numbers = []
+    if len(numbers) != 3:
+        raise ValueError(f"viewpoint must be a point with x, y and z, such as 'POINT Z (1 2 3)', found {viewpoint!r}")
+    return np.asarray(numbers)
+
+
+def _run(
+    ins: Dimensions, outs: MutableMapping[str, NDArray[Any]], step: Filter, sensors: Sensors | None = None
+) -> bool:
     for name in "XYZ":
         if name not in ins:
             raise ValueError(f"ins must hold the dimensions X, Y and Z, found {', '.join(ins)}")
-    layer = step(PointSet(np.stack([ins[name] for name in "XYZ"], axis=1)))
+    layer = step(PointSet(np.stack([ins[name] for name in "XYZ"], axis=1), sensors=sensors))
     if layer.normals is not None:
         for axis, name in enumerate(NORMAL):
             if name not in ins:

@@ -7,9 +7,10 @@ import pytest
 
 from face_plugin import Params, estimate_normals
 from face_plugin.adapters import pdal
-from face_plugin.shapes import nested_box, torus
+from face_plugin.shapes import box, nested_box, torus
 
 SHAPE = torus(600)
+VIEW = [[0.1, 0.0, -0.2]]
 
 
 def dimensions(points, *, normals=True, dtype=np.float64):
@@ -58,6 +59,38 @@ def test_a_function_with_settings():
     assert np.array_equal(outs["Mask"], ~result.interior)
     with pytest.raises(ValueError, match="alpha must be in"):
         pdal.configured(alpha=2.0)
+
+
+@pytest.mark.parametrize(
+    "viewpoint",
+    ["POINT Z (0.1 0 -0.2)", " point(0.1 0 -0.2)", '{"type": "Point", "coordinates": [0.1, 0, -0.2]}', VIEW],
+)
+def test_a_viewpoint_as_pdal_writes_it(viewpoint):
+    room, outs = box(600), {}
+    step = pdal.configured(interior=True, viewpoint=viewpoint)
+    assert step(dimensions(room.points), outs) is True
+    expected = estimate_normals(room.points, viewpoints=VIEW).normals
+    assert np.array_equal(np.stack([outs[name] for name in pdal.NORMAL], axis=1), expected)
+    assert ((expected * room.normals).sum(axis=1) < 0).all()
+    # The room's walls are no interior of anything.
+    assert "Mask" not in outs
+
+
+def test_always_up():
+    side = np.stack(np.meshgrid(np.linspace(-1, 1, 25), np.linspace(-1, 1, 25)), axis=-1).reshape(-1, 2)
+    outs = {}
+    pdal.configured(always_up=True)(dimensions(np.column_stack([side, 0.2 * np.sin(3 * side[:, 0])])), outs)
+    assert (outs["NormalZ"] > 0).all()
+
+
+@pytest.mark.parametrize(
+    "viewpoint", ["POINT (1 2)", "here", "[1, 2, 3]", "POINT Z (a b c)", "LINESTRING (0 0 0, 1 1 1)"]
+)
+def test_a_viewpoint_that_is_none(viewpoint):
+    with pytest.raises(
+        ValueError, match=r"viewpoint must be a point with x, y and z, such as 'POINT Z \(1 2 3\)', found"
+    ):
+        pdal.configured(viewpoint=viewpoint)
 
 
 @pytest.mark.parametrize("function", [pdal.estimate_normals, pdal.remove_interior, pdal.configured()])

@@ -1,16 +1,19 @@
 """The PyMeshLab filters with the real PyMeshLab: its conventions, and nothing else of a layer touched."""
 
+import builtins
+
 import numpy as np
 import pytest
 
 from face_plugin import Params, estimate_normals, reconstruct
 from face_plugin.adapters import pymeshlab as face
-from face_plugin.shapes import nested_box, torus
+from face_plugin.shapes import box, nested_box, torus
 
 ml = pytest.importorskip("pymeshlab")
 
 SHAPE = torus(600)
 NESTED = nested_box(900)
+ROOM = box(600)
 NAMES = (
     "compute_normal_by_faraday_cage",
     "compute_selection_by_faraday_interior",
@@ -154,6 +157,9 @@ def test_a_surface_is_a_new_current_layer_in_the_coordinates_of_the_scene():
         ({"cage_spacing": 0.1}, "PyMeshLabException", "must be a pymeshlab.PercentageValue object or"),
         ({"alpha": "thick"}, "RuntimeError", "[uU]nable to cast Python instance of type <class 'str'>"),
         ({"alpha": None}, "RuntimeError", "unable to cast Python instance of type <class 'NoneType'>"),
+        ({"viewpont": (0, 0, 0)}, "PyMeshLabException", r"Parameter viewpont not found .* Did you mean viewpos\?"),
+        ({"viewpos": [1, 2]}, "PyMeshLabException", "Parameter viewpos: must be 3 finite numbers, found"),
+        ({"viewpos": "here"}, "ValueError", "could not convert string to float"),
         ({"seed": 1.5}, "RuntimeError", "unable to cast Python instance of type <class 'float'>"),
         ({"onselected": "yes"}, "RuntimeError", "unable to cast Python instance of type <class 'str'>"),
         ({"solid": "cube"}, "InvalidEnumException", "Enum 'cube' not found. Possible values are 'octa"),
@@ -170,7 +176,7 @@ def test_a_surface_is_a_new_current_layer_in_the_coordinates_of_the_scene():
     ],
 )
 def test_wrong_parameters_raise_what_pymeshlab_raises(arguments, error, message):
-    kind = getattr(ml, error, RuntimeError)
+    kind = getattr(ml, error, None) or getattr(builtins, error)
     ms = layer()
     with pytest.raises(kind, match=message) as caught:
         face.compute_normal_by_faraday_cage(ms, **arguments)
@@ -185,6 +191,8 @@ def test_the_kinds_of_errors_are_those_of_pymeshlabs_own_filters():
         (RuntimeError, {"k": "ten"}),
         (RuntimeError, {"k": 1.5}),
         (RuntimeError, {"flipflag": "yes"}),
+        (ml.PyMeshLabException, {"viewpos": [1, 2]}),
+        (ValueError, {"viewpos": "here"}),
     ):
         with pytest.raises(error) as caught:
             ms.compute_normal_for_point_clouds(**arguments)
@@ -265,3 +273,53 @@ def test_registered_filters_are_methods_and_known_by_name():
         face.unregister()
     assert not any(hasattr(ml.MeshSet, name) for name in NAMES)
     assert {name: ml.MeshSet.__dict__[name] for name in originals} == originals
+
+
+def test_a_viewpoint_has_the_names_of_meshlabs_own_filter():
+    ms = ml.MeshSet()
+    ms.add_mesh(ml.Mesh(ROOM.points))
+    ms.compute_matrix_from_translation(axisx=5, freeze=False)
+    inside = {"flipflag": True, "viewpos": np.array([0.1, 0.0, 0.0])}
+    ms.compute_normal_for_point_clouds(**inside)
+    face.compute_normal_by_faraday_cage(ms, alpha="auto", **inside)
+    expected = estimate_normals(ROOM.points, viewpoints=[[0.1, 0.0, 0.0]]).normals
+    assert np.array_equal(ms.current_mesh().vertex_normal_matrix(), expected)
+    assert ((expected * ROOM.normals).sum(axis=1) < 0).all()
+    # A position alone changes nothing, as there.
+    face.compute_normal_by_faraday_cage(ms, viewpos=(0.1, 0.0, 0.0))
+    assert np.array_equal(ms.current_mesh().vertex_normal_matrix(), estimate_normals(ROOM.points).normals)
+    face.compute_selection_by_faraday_interior(ms, **inside)
+    assert ms.current_mesh().selected_vertex_number() == 0
+    # The reconstruction works in the scene, where the layer is moved.
+    face.generate_surface_reconstruction_faraday(ms, depth=5, flipflag=True, viewpos=(5.1, 0.0, 0.0))
+    corners = ms.current_mesh().vertex_matrix()[ms.current_mesh().face_matrix()] - [5.0, 0.0, 0.0]
+    assert np.linalg.det(corners).sum() < 0
+
+
+def test_a_viewpoint_survives_a_script(tmp_path):
+    ms = ml.MeshSet()
+    ms.add_mesh(ml.Mesh(ROOM.points))
+    face.compute_normal_by_faraday_cage(ms, flipflag=True, viewpos=(0.1, 0.0, -0.2))
+    expected = ms.current_mesh().vertex_normal_matrix()
+    path = tmp_path / "script.mlx"
+    ms.save_filter_script(str(path))
+    again = ml.MeshSet()
+    again.add_mesh(ml.Mesh(ROOM.points))
+    face.run_filter_script(again, path)
+    assert np.array_equal(again.current_mesh().vertex_normal_matrix(), expected)
+    path.write_text(path.read_text().replace('x="0.1"', 'x="left"'), encoding="utf-8")
+    with pytest.raises(ml.PyMeshLabException, match=r"step 1 .*parameter viewpos: 'left,0,-0.2' is no position"):
+        face.run_filter_script(again, path)
+
+
+def test_a_misspelt_filter_is_answered_with_the_nearest_name():
+    face.register()
+    try:
+        with pytest.raises(ml.PyMeshLabException, match=r"Did you mean compute_normal_by_faraday_cage\?"):
+            layer().apply_filter("compute_normals_by_faraday_cage")
+        with pytest.raises(ml.PyMeshLabException, match="There are compute_normal_by_faraday_cage, compute_sel"):
+            layer().apply_filter("faraday")
+        with pytest.raises(ml.PyMeshLabException, match="Filter does not exists"):
+            layer().apply_filter("compute_normals")
+    finally:
+        face.unregister()

@@ -8,7 +8,7 @@ import pytest
 
 from face_plugin import Params, estimate_normals, reconstruct
 from face_plugin.adapters import pyvista as adapter
-from face_plugin.shapes import torus
+from face_plugin.shapes import box, torus
 
 pv = pytest.importorskip("pyvista", minversion="0.48")
 
@@ -41,6 +41,27 @@ def test_a_surface_is_that_of_the_array_call():
     assert np.array_equal(mesh.regular_faces, surface.faces)
     assert np.array_equal(mesh.point_data["densities"], surface.densities)
     assert mesh.is_all_triangles
+
+
+def test_sensors_reach_normals_and_surface():
+    room, views = box(600), [[0.1, 0.0, 0.0]]
+    cloud = pv.PolyData(room.points)
+    expected = estimate_normals(room.points, viewpoints=views).normals
+    assert ((expected * room.normals).sum(axis=1) < 0).all()
+    assert np.array_equal(cloud.face.estimate_normals(viewpoints=views).point_data["Normals"], expected)
+    mesh = cloud.face.reconstruct(depth=5, backend="open3d", viewpoints=views)
+    assert np.array_equal(mesh.points, reconstruct(room.points, depth=5, backend="open3d", viewpoints=views).vertices)
+
+
+def test_the_accessor_is_there_at_first_use_without_an_import_of_ours():
+    code = """
+import sys
+import pyvista
+pyvista.PolyData([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).face.estimate_normals
+assert "face_plugin.adapters.pyvista" in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_registering_can_be_undone_and_repeated(recwarn):

@@ -5,7 +5,7 @@ import pytest
 
 from face_plugin import Params, estimate_normals, reconstruct
 from face_plugin.adapters import trimesh as adapter
-from face_plugin.shapes import torus
+from face_plugin.shapes import box, sphere, torus
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -35,3 +35,20 @@ def test_a_surface_is_a_trimesh():
     assert mesh.is_watertight
     # The torus of the generator: 2 pi^2 R r^2 with R = 1 and r = 0.4; an octree of depth 5 has cells of 0.1.
     assert mesh.volume == pytest.approx(2 * np.pi**2 * 0.16, rel=0.05)
+
+
+def test_a_scene_is_all_its_geometries_in_its_own_frame():
+    ball = sphere(300)
+    scene = trimesh.Scene([trimesh.PointCloud(ball.points)])
+    scene.add_geometry(trimesh.PointCloud(ball.points), transform=trimesh.transformations.translation_matrix([5, 0, 0]))
+    points = adapter.points_of(scene)
+    assert np.allclose(points, np.concatenate([ball.points, ball.points + np.array([5.0, 0.0, 0.0])]))
+    assert np.array_equal(adapter.estimate_normals(scene).normals, estimate_normals(points).normals)
+    with pytest.raises(ValueError, match="the scene must hold a geometry with points"):
+        adapter.points_of(trimesh.Scene())
+
+
+def test_sensors_are_passed_on():
+    room = box(600)
+    result = adapter.estimate_normals(trimesh.PointCloud(room.points), viewpoints=[[0.1, 0.0, 0.0]])
+    assert ((result.normals * room.normals).sum(axis=1) < 0).all()

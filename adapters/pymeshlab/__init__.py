@@ -13,8 +13,9 @@ As functions, or after `register` as methods of every ``MeshSet`` and by name::
 Every filter works on the current layer, is recorded in the MeshSet's filter script, and takes the settings
 of `face_plugin.Params` by their own names: numbers as numbers, choices as their name or index, lengths
 (``cage_spacing``) as ``PercentageValue`` of the layer's diagonal or ``PureValue``. An ``alpha`` or
-``cage_spacing`` of 0, the default, means automatic. ``sculpt`` is the path of a file of charges and cage
-points, in the coordinates of the layer; for the reconstruction in those of the scene. Wrong parameters raise
+``cage_spacing`` of 0, the default, or ``"auto"`` means automatic. With ``flipflag`` normals point to what is seen from
+``viewpos``, the names of MeshLab's own filter for point clouds. ``sculpt`` is the path of a file of charges and cage
+points. Both are in the coordinates of the layer; for the reconstruction in those of the scene. Wrong parameters raise
 what PyMeshLab raises for its own filters.
 """
 

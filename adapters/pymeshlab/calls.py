@@ -22,6 +22,8 @@ def compute_normal_by_faraday_cage(ms: Any, **parameters: Any) -> None:
     ms : pymeshlab.MeshSet
     onselected : bool
         Change the normals of the selected vertices only; all of them conduct.
+    flipflag, viewpos : bool, (3,) array_like
+        Whether normals point to what is seen from a viewpoint, and where that is.
     alpha, cage_spacing, ...
         Settings of `face_plugin.Params`.
 

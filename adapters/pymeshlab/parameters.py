@@ -8,12 +8,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_type_hints
 
+import numpy as np
+
+from face_plugin.adapters.pymeshlab.script import Element
 from face_plugin.errors import require
 from face_plugin.params import CHOICES, Params
 
 __all__ = ["Parameter", "common_parameters", "params_of"]
 
-Kind = Literal["bool", "int", "float", "str", "enum", "length"]
+Kind = Literal["bool", "int", "float", "str", "enum", "length", "position"]
 TYPES: dict[str, str] = {
     "bool": "RichBool",
     "int": "RichInt",
@@ -21,6 +24,7 @@ TYPES: dict[str, str] = {
     "str": "RichString",
     "enum": "RichEnum",
     "length": "RichAbsPerc",
+    "position": "RichPosition",
 }
 CASTS: dict[str, Callable[[Any], Any]] = {
     "bool": bool,
@@ -39,13 +43,15 @@ class Parameter:
     name: str
     kind: Kind
     default: Any
-    """Of a length, in the unit of the layer; of an enum, one of `choices`."""
+    """Of a length or position, in the unit of the layer; of an enum, one of `choices`."""
     text: str = ""
     choices: tuple[str, ...] = ()
 
     def cast(self, value: Any, diagonal: float) -> Any:
         """Value of a keyword argument, or what PyMeshLab raises for one of the wrong type."""
         ml = require("pymeshlab", extra="pymeshlab")
+        if isinstance(value, str) and value == "auto" and self.text == AUTOMATIC:
+            return self.default
         if self.kind == "length":
             if isinstance(value, ml.PercentageValue):
                 return value.value() / 100.0 * diagonal
@@ -55,6 +61,12 @@ class Parameter:
                 f"Parameter {self.name}: must be a pymeshlab.PercentageValue object or a pymeshlab.PureValue "
                 "object. Other type values are not accepted."
             )
+        if self.kind == "position":
+            # What MeshLab's own filters raise where it is none.
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape != (3,) or not np.isfinite(array).all():
+                raise ml.PyMeshLabException(f"Parameter {self.name}: must be 3 finite numbers, found {value!r}")
+            return tuple(array.tolist())
         if isinstance(value, str) and self.kind == "str":
             return value
         if isinstance(value, str) and self.kind == "enum":
@@ -77,9 +89,13 @@ class Parameter:
             raise ml.InvalidEnumException(f"Enum {number} not valid. Must be a value {allowed}")
         return self.choices[number]
 
-    def read(self, text: str) -> Any:
+    def read(self, element: Element) -> Any:
         """Value of a ``Param`` of a script."""
+        text = element.get("value", "")
         try:
+            if self.kind == "position":
+                text = ",".join(element.get(axis, "") for axis in "xyz")
+                return tuple(float(word) for word in text.split(","))
             if self.kind == "bool":
                 return {"true": True, "false": False}[text]
             if self.kind == "enum":
@@ -95,6 +111,9 @@ class Parameter:
         result = {"type": TYPES[self.kind], "name": self.name, "value": str(value)}
         if self.kind == "bool":
             result["value"] = str(value).lower()
+        elif self.kind == "position":
+            del result["value"]
+            result |= {axis: str(number) for axis, number in zip("xyz", value, strict=True)}
         elif self.kind == "length":
             result |= {"min": "0", "max": f"{diagonal:g}"}
         elif self.kind == "enum":

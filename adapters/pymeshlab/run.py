@@ -6,8 +6,9 @@ import os
 from typing import Any
 
 from face_plugin.adapters.pymeshlab import calls
-from face_plugin.adapters.pymeshlab.filters import FILTERS, apply_by_name, apply_step, python_name
+from face_plugin.adapters.pymeshlab.filters import apply_by_name, apply_step, suggestion
 from face_plugin.adapters.pymeshlab.script import Element, apply_host_step, load_steps, read_steps, steps_of
+from face_plugin.adapters.pymeshlab.table import FILTERS, python_name
 from face_plugin.errors import require
 
 __all__ = ["register", "run_filter_script", "unregister"]
@@ -58,6 +59,10 @@ def register() -> None:
     _originals.update({name: getattr(mesh_set, name) for name in ("apply_filter", "apply_filter_script")})
 
     def apply_filter(self: Any, filter_name: str, **kwargs: Any) -> dict[str, Any]:
+        if "faraday" in filter_name and filter_name not in FILTERS:
+            raise require("pymeshlab", extra="pymeshlab").PyMeshLabException(
+                f"Failed to apply filter: {filter_name}\nFilter does not exist. {suggestion(filter_name, FILTERS)}"
+            )
         if filter_name not in FILTERS:
             result: dict[str, Any] = _originals["apply_filter"](self, filter_name, **kwargs)
             return result

@@ -1,4 +1,4 @@
-# make demo      a mesh and two pictures of a generated cloud, in out/
+# make demo      a mesh and pictures of generated clouds, in out/
 # make test      the tests that take seconds        make test-all   all of them
 # make lint      ruff (its format too) and mypy     make bench      the benchmarks
 # make fuzz      random clouds, files, faults and threads: N= cases from SEED=, only those of KIND=
@@ -30,6 +30,7 @@ demo: $(STAMP)
 	$(BIN)/face mesh out/demo_points.ply -o out/demo.ply
 	$(BIN)/face plot out/demo_points.ply -o out/demo.png --title "Faraday cage estimation of normals"
 	$(BIN)/face plot --interior out/demo_points.ply -o out/demo_interior.png --title "What the interior filter does"
+	$(BIN)/python examples/which_side.py --out out --only room street
 
 test: $(STAMP)
 	@$(BIN)/python -m pytest

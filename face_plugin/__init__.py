@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from face_plugin.result import Result, Surface
     from face_plugin.solver import FaCE
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "FaCE",
     "FaceError",

@@ -33,13 +33,15 @@ def run(name, folder, *arguments):
         ("numpy_only.py", ("--points", "1500"), {"numpy_only.png", "numpy_only_normals.npy"}),
         ("open3d_pipeline.py", ("--points", "1500"), {"open3d_pipeline.png", "open3d_pipeline.ply"}),
         ("open3d_dropin.py", ("--points", "800"), {"open3d_dropin.png"}),
+        ("which_side.py", ("--points", "600", "--only", "terrain"), {"which_side_terrain.png"}),
         ("meshlab_script.py", ("--points", "1500"), {"meshlab_script.png", "meshlab_script.ply"}),
     ],
 )
 def test_an_example_leaves_its_picture(tmp_path, name, arguments, files):
     run(name, tmp_path, *arguments)
     assert {path.name for path in tmp_path.iterdir()} == files
-    image = np.asarray(Image.open(tmp_path / f"{Path(name).stem}.png").convert("L"))
+    picture = next(file for file in files if file.endswith(".png"))
+    image = np.asarray(Image.open(tmp_path / picture).convert("L"))
     # Two shaded panels: an empty figure has two or three grey values and hardly any dark pixel.
     for panel in np.array_split(image, 2, axis=1):
         assert len(np.unique(panel)) > 50

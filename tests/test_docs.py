@@ -1,0 +1,34 @@
+"""What README and docs print runs as printed, and their links lead somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from face_plugin import examples
+from face_plugin.app.cli import main
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/which-side.md"])
+def test_python_runs_as_printed(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # Samples of a few points: what is shown is that the lines run.
+    monkeypatch.setattr(examples, "POINTS", 500)
+    monkeypatch.setattr(examples.load, "__defaults__", (500, 0))
+    assert main(["example", "object", "-o", "scan.ply", "--points", "500", "--quiet"]) == 0
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) >= 3
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, page, "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    text = page.read_text(encoding="utf-8")
+    targets = [target.split("#")[0] for target in re.findall(r"\]\(([^)\s]+)\)", text)]
+    missing = [target for target in targets if target and "://" not in target and not (page.parent / target).exists()]
+    assert missing == []

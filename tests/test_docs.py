@@ -1,14 +1,17 @@
 """What README and docs print runs as printed, and their links lead somewhere."""
 
+import importlib
 import re
 from pathlib import Path
 
 import pytest
 
+import face_plugin
 from face_plugin import examples
 from face_plugin.app.cli import main
 
 ROOT = Path(__file__).parents[1]
+API = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -32,3 +35,17 @@ def test_links_lead_somewhere(page):
     targets = [target.split("#")[0] for target in re.findall(r"\]\(([^)\s]+)\)", text)]
     missing = [target for target in targets if target and "://" not in target and not (page.parent / target).exists()]
     assert missing == []
+
+
+@pytest.mark.parametrize("module", re.findall(r"^## .*`(\S+)`", API, re.MULTILINE))
+def test_every_public_name_is_listed_and_no_other(module):
+    section = API.split(f"`{module}`\n")[1].split("\n## ")[0]
+    listed = re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)
+    assert sorted(listed) == sorted(importlib.import_module(module).__all__)
+
+
+def test_the_version_is_the_same_everywhere():
+    release = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    project = re.search(r'^version = "(.+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)
+    citation = re.search(r"^version: (\S+)", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [found and found[1] for found in (release, project, citation)] == [face_plugin.__version__] * 3

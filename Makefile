@@ -2,6 +2,7 @@
 # make test      the tests that take seconds        make test-all   all of them
 # make lint      ruff (its format too) and mypy     make bench      the benchmarks
 # make fuzz      random clouds, files, faults and threads: N= cases from SEED=, only those of KIND=
+# make docs      the site, in out/site; warnings are errors
 # Each makes .venv first, and makes it again when pyproject.toml has changed. PYTHON=... chooses the interpreter.
 
 SHELL := /bin/bash
@@ -58,6 +59,10 @@ N ?= 1000
 SEED ?= 0
 fuzz: $(STAMP)
 	@$(BIN)/python tests/fuzz --cases $(N) --seed $(SEED) $(if $(KIND),--kind $(KIND))
+
+docs: $(STAMP)
+	@$(BIN)/pip install --quiet --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 setup: $(STAMP)
 

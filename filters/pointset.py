@@ -128,15 +128,24 @@ class PointSet:
             attributes={name: values[self.keep] for name, values in self.attributes.items()},
             surface=self.surface,
             cage=self.cage,
-            sensors=None if self.sensors is None else self.sensors.of(self.keep),
+            sensors=self.sensors_of_kept(),
         )
 
     def solved(self, params: Params | None = None, progress: Progress | None = None) -> FaCE | Tiled:
         """Return the cage of the kept points: the one at hand, unless `params` asks for another."""
         if self.cage is not None and (params is None or params == self.cage.params):
             return self.cage
-        sensors = None if self.sensors is None else self.sensors.of(self.keep)
-        return solve(self.points[self.keep], params, sensors=sensors, classify=self.classify, progress=progress)
+        return solve(
+            self.points[self.keep],
+            params,
+            sensors=self.sensors_of_kept(),
+            classify=self.classify,
+            progress=progress,
+        )
+
+    def sensors_of_kept(self) -> Sensors | None:
+        """Return the sensors, with the rows of the kept points alone."""
+        return None if self.sensors is None else self.sensors.of(self.keep)
 
     def scatter(self, values: NDArray[Any]) -> NDArray[Any]:
         """Spread values of the kept points over all n rows; the other rows are zero."""

@@ -64,7 +64,11 @@ class Sculpt(Filter):
         if not isinstance(cage, FaCE):
             # Edits need the one mesh that they are made in, whatever its size.
             cage = solve_whole(
-                layer.points[layer.keep], cage.params, purpose="sculpting", sensors=layer.sensors, progress=progress
+                layer.points[layer.keep],
+                cage.params,
+                purpose="sculpting",
+                sensors=layer.sensors_of_kept(),
+                progress=progress,
             )
         return layer.replace(cage=cage.sculpted(self.file))
 

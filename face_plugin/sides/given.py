@@ -13,6 +13,9 @@ __all__ = ["checked_trust", "given_lines", "sides_of_lines"]
 
 # Weight of a trusted normal, next to couplings of 1 at most: nothing outweighs it.
 TRUST = 1e6
+# Weight of what the method found: it speaks as loud as three neighbours (of 1, 3, 8 and 20 the best on bodies with thin
+# parts: of exact lines 99.83 % then point outward, against 99.58 % of its own sides).
+FOUND = 3.0
 # Weight of what the method found where some normals are trusted: less than a coupling, or it would stop them at once.
 BESIDE_TRUST = 0.05
 
@@ -113,8 +116,8 @@ def sides_of_lines(
     line = lines[speaker]
     alike = np.where(np.einsum("nd,nd->n", lines, line[rows]) < 0, -1.0, 1.0)
     weight = np.bincount(rows, alike * evidence, minlength=count).astype(np.float64)
+    weight *= FOUND if trusted is None else BESIDE_TRUST
     if trusted is not None:
-        weight *= BESIDE_TRUST
         weight[rows[trusted]] = TRUST
     edges = neighbours_around(around, line)
     sign = cluster_signs(count, edges, couplings(around.points, line, edges), weight)[rows] * alike

@@ -93,6 +93,9 @@ def test_the_files_own_viewpoint_is_used_and_said(scan: Path, capfd: pytest.Capt
     assert inward(out)
     assert "the file says where it was seen from: 0.1, 0, 0" in err
     assert run(capfd, "normals", scan, "-o", out, "--quiet")[2] == ""
+    _, _, err = run(capfd, "normals", scan, "-o", out, "--viewpoints", "none")
+    assert not inward(out)
+    assert "the file says" not in err
     # What is given comes first.
     _, _, err = run(capfd, "normals", scan, "-o", out, "--viewpoint", "50,0,0")
     assert not inward(out)

@@ -17,6 +17,8 @@ from face_plugin.sides.sensors import sensors_of
 __all__ = ["add_sensors", "joined", "own_viewpoints", "sensors_in"]
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+# In place of a file: the cloud's own viewpoints are not used.
+_NONE = Path("none")
 # Options whose value may start with a minus sign.
 _SIGNED = ("--viewpoint", "--up", "--seen-up")
 
@@ -32,7 +34,10 @@ def add_sensors(parser: argparse.ArgumentParser, *, up: str = "--up") -> None:
         help="where a sensor stood, in the unit of the file: normals point to what it saw; may be given several times",
     )
     group.add_argument(
-        "--viewpoints", metavar="FILE", type=Path, help="file of such positions, such as a trajectory (CSV, PLY, ...)"
+        "--viewpoints",
+        metavar="FILE",
+        type=Path,
+        help="file of such positions, such as a trajectory (CSV, PLY, ...); none: not even those that IN holds",
     )
     group.add_argument(
         up,
@@ -69,10 +74,10 @@ def sensors_in(args: argparse.Namespace, console: Console, cloud: CloudFile | No
         What was given, or the file of viewpoints, is not what it should be.
     """
     given: list[NDArray[Any]] = [np.array(args.viewpoint)] if args.viewpoint else []
-    if args.viewpoints is not None:
+    if args.viewpoints not in (None, _NONE):
         given.append(read_cloud(args.viewpoints).points.astype(np.float64))
     views = np.concatenate(given) if given else None
-    if views is None and args.seen_up is None and cloud is not None:
+    if views is None and args.viewpoints is None and args.seen_up is None and cloud is not None:
         views = own_viewpoints(cloud, console)
     # Said now rather than after the cloud is prepared.
     sensors_of(views, None, args.seen_up)

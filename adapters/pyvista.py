@@ -37,6 +37,11 @@ class FaceAccessor:
     dataset : pyvista.DataSet
         Its points are used; cells, if it has any, are not.
 
+    Raises
+    ------
+    TypeError
+        It is no dataset.
+
     Examples
     --------
     >>> import pyvista
@@ -47,6 +52,9 @@ class FaceAccessor:
     """
 
     def __init__(self, dataset: Any) -> None:
+        if not hasattr(dataset, "point_data"):
+            hint = ": pass pyvista.PolyData(points)"
+            raise TypeError(f"dataset must be a PyVista dataset, found {type(dataset).__name__}{hint}")
         self._dataset = dataset
 
     def estimate_normals(

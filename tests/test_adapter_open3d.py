@@ -162,7 +162,8 @@ def test_a_tensor_cloud_gives_a_tensor_mesh():
     options = {"depth": 5, "filter_interior": False, "screened": False}
     mesh, densities = face.create_from_point_cloud_face(tensor(), **options)
     assert isinstance(mesh, o3d.t.geometry.TriangleMesh)
-    assert len(densities) == mesh.vertex.positions.shape[0]
+    assert isinstance(densities, o3d.core.Tensor)
+    assert densities.shape == [mesh.vertex.positions.shape[0]]
     surface = reconstruct(SHAPE.points.astype(np.float32), **options)
     assert np.allclose(mesh.vertex.positions.numpy(), surface.vertices, atol=1e-6)
 

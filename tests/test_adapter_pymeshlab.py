@@ -323,3 +323,10 @@ def test_a_misspelt_filter_is_answered_with_the_nearest_name():
             layer().apply_filter("compute_normals")
     finally:
         face.unregister()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_mesh_or_an_array_is_a_type_error_that_says_what_to_pass(name):
+    for found in (ml.Mesh(SHAPE.points), SHAPE.points):
+        with pytest.raises(TypeError, match=r"ms must be a MeshSet, found \w+: pass a pymeshlab.MeshSet"):
+            getattr(face, name)(found)

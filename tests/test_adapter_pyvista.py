@@ -84,3 +84,10 @@ assert pyvista.register() is False
 pyvista.unregister()
 """
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_wrong_types_say_what_to_pass():
+    with pytest.raises(TypeError, match=r"dataset must be a PyVista dataset, found ndarray: pass pyvista.PolyData"):
+        adapter.FaceAccessor(SHAPE.points)
+    with pytest.raises(TypeError, match=r"params must be a face_plugin.Params or None, found dict"):
+        pv.PolyData(SHAPE.points).face.estimate_normals({"alpha": 0.1})

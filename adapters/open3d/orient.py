@@ -68,8 +68,8 @@ def orient_normals_towards_camera_location(
 ) -> None:
     """Turn the cloud's normals to the side that a camera saw, in place; their lines stay as they are.
 
-    Unlike Open3D's, it asks which points the camera saw: those hidden from it take the side of their sheet. Of a whole
-    object seen from one place, so, all normals point outward.
+    Unlike Open3D's, it asks which points the camera saw: those hidden from it take the side of their sheet, such as
+    the back of an object. A point counts as hidden where another one lies in front of it by three spacings or more.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ def create_from_point_cloud_face(
     -------
     mesh : open3d.geometry.TriangleMesh, or for a tensor cloud open3d.t.geometry.TriangleMesh
         With vertex normals, and with colours where the points have them: those of the nearest point kept.
-    densities : open3d.utility.DoubleVector
+    densities : open3d.utility.DoubleVector, or for a tensor cloud an open3d.core.Tensor (k,) of float64
         Sampling density at the vertices.
 
     Examples
@@ -74,4 +74,5 @@ def create_from_point_cloud_face(
         mesh.vertex_colors = o3d.utility.Vector3dVector(np.asarray(legacy.colors)[layer.keep][nearest])
     if is_tensor(pcd):
         mesh = o3d.t.geometry.TriangleMesh.from_legacy(mesh, device=pcd.device)
+        return mesh, o3d.core.Tensor(np.array(surface.densities), device=pcd.device)
     return mesh, o3d.utility.DoubleVector(surface.densities)

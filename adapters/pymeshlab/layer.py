@@ -20,10 +20,15 @@ def current_points(ms: Any, name: str, *, transformed: bool = False, onselected:
 
     Raises
     ------
+    TypeError
+        `ms` is no MeshSet.
     PyMeshLabException
         There is no layer, or nothing is selected in it where only the selection is to change.
     """
     ml = require("pymeshlab", extra="pymeshlab")
+    if not isinstance(ms, ml.MeshSet):
+        hint = ": pass a pymeshlab.MeshSet() after its add_mesh(mesh)"
+        raise TypeError(f"ms must be a MeshSet, found {type(ms).__name__}{hint}")
     if ms.mesh_number() == 0:
         raise ml.PyMeshLabException(f"{name} requires at least one mesh loaded in the MeshSet.")
     mesh = ms.current_mesh()

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command
-from face_plugin.cloud import prepare
 from face_plugin.io import CloudFile, read_cloud
-from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.strays import find_strays
 from face_plugin.threads import KDTree
 
 __all__ = ["register"]
@@ -68,6 +65,10 @@ def describe(cloud: CloudFile) -> dict[str, Any]:
 
 def _strays(points: NDArray[np.float64]) -> int | None:
     """Count the points too far from everything; None where they are too many to count in a moment, or no body."""
+    from face_plugin.cloud import prepare
+    from face_plugin.neighbourhood import Neighbourhood
+    from face_plugin.sides.strays import find_strays
+
     if len(points) > MOST_JUDGED:
         return None
     try:

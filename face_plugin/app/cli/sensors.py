@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from face_plugin.app.cli.console import Console
 from face_plugin.io import CloudFile, read_cloud
-from face_plugin.sides.sensors import sensors_of
 
 __all__ = ["add_sensors", "joined", "own_viewpoints", "sensors_in"]
 
@@ -73,6 +72,8 @@ def sensors_in(args: argparse.Namespace, console: Console, cloud: CloudFile | No
     ValueError
         What was given, or the file of viewpoints, is not what it should be.
     """
+    from face_plugin.sides.sensors import sensors_of
+
     given: list[NDArray[Any]] = [np.array(args.viewpoint)] if args.viewpoint else []
     if args.viewpoints not in (None, _NONE):
         given.append(read_cloud(args.viewpoints).points.astype(np.float64))

@@ -15,7 +15,7 @@ __all__ = ["Surface"]
 
 @dataclass(frozen=True)
 class Surface(Filter):
-    """Reconstruct the surface of the kept points from their normals, by a host's Poisson reconstruction.
+    """Reconstruct the surface of the kept points but strays from their normals, by a host's Poisson reconstruction.
 
     Parameters
     ----------
@@ -51,11 +51,13 @@ class Surface(Filter):
             raise ValueError("a surface needs normals, and the points have none: put a 'normals' step first")
         if not layer.keep.any():
             raise ValueError(f"a surface needs points, and none of the {len(layer)} are kept")
+        # Strays are of no surface, also where no interior step left them out.
+        keep = layer.keep if layer.cage is None else layer.keep & ~layer.scatter(layer.cage.strays)
         if progress is not None:
             progress("surface", 0.0)
         vertices, faces, densities = poisson_reconstruction(
-            layer.points[layer.keep],
-            layer.normals[layer.keep],
+            layer.points[keep],
+            layer.normals[keep],
             depth=self.depth,
             screened=self.screened,
             backend=self.backend,

@@ -155,3 +155,12 @@ def test_a_surface_without_normals_or_points_says_so(ring):
         Surface()(PointSet(ring.points))
     with pytest.raises(ValueError, match="none of the 700 are kept"):
         Surface()(PointSet(ring.points, ring.normals, np.zeros(700, dtype=bool)))
+
+
+def test_strays_are_of_no_surface_without_the_interior_step_either(ring):
+    points = np.concatenate([ring.points, [[9.0, 0.0, 0.0]]])
+    layer = Chain([Normals(), Surface(depth=5)])(PointSet(points))
+    assert layer.keep.all()
+    expected = reconstruct(points, depth=5, filter_interior=False)
+    assert np.array_equal(layer.surface.vertices, expected.vertices)
+    assert np.abs(layer.surface.vertices).max() < 5

@@ -30,8 +30,8 @@ class Result:
     strength: NDArray[np.floating]
     """(n,) E_max at the point's ball; unshielded space has 1."""
     confidence: NDArray[np.floating]
-    """(n,) confidence in the side of the normal, in [0, 1]: the agreement of field and points, times the jump of the
-    winding number across the point; see `face_plugin.sides.confidence`."""
+    """(n,) confidence in the side of the normal, in [0, 1]: the agreement of field, or sensors, and points, times the
+    jump of the winding number across the point; see `face_plugin.sides.confidence`."""
     interior: NDArray[np.bool_] | None
     """(n,) whether the point lies inside the object; None where it was not asked for."""
     timings: dict[str, float]

@@ -22,7 +22,7 @@ from face_plugin.result import Result
 from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
-from face_plugin.sides.confidence import confidence
+from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.given import checked_trust, given_lines, sides_of_lines
 from face_plugin.sides.sensors import Sensors, sights
 from face_plugin.sides.sheets import Sheets
@@ -72,7 +72,7 @@ class Reading:
     @cached_property
     def confidence(self) -> NDArray[np.float64]:
         """Confidence (m,) in the side of the normals."""
-        return confidence(self.around, self.seen.votes, self.normals)
+        return confidence(self.around, witness(self.seen.votes, self.sights), self.normals)
 
     def threshold(self, alpha: float | str) -> float:
         """Alpha as a number, which "auto" derives from the leak of the cage."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+import face_plugin
 from face_plugin import estimate_normals, examples, shapes
 
 
@@ -141,3 +142,15 @@ def test_a_noisy_sphere_loses_next_to_nothing():
     shape = shapes.with_noise(shapes.sphere(count), 0.5 * np.sqrt(4 * np.pi / count), seed=1)
     result = estimate_normals(shape.points, filter_interior=True)
     assert (~result.kept).mean() <= 0.01
+
+
+def test_confidence_is_in_the_side_that_sensors_saw():
+    room = examples.load("room", 2000)
+    result = estimate_normals(room.points, viewpoints=room.viewpoints)
+    good = np.einsum("nd,nd->n", result.normals, room.normals) > 0
+    assert np.median(result.confidence[good]) > 0.5
+    # In tiles as well, which find it out by themselves.
+    tiled = estimate_normals(
+        room.points, face_plugin.Params(tile_points=1000, engine="serial"), viewpoints=room.viewpoints
+    )
+    assert np.median(tiled.confidence[good]) > 0.5

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
 
-__all__ = ["confidence"]
+__all__ = ["confidence", "witness"]
 
 
 def confidence(
     around: Neighbourhood,
-    field: NDArray[np.float64],
+    witnessed: NDArray[np.float64],
     normals: NDArray[np.float64],
     rows: NDArray[np.intp] | slice = slice(None),
 ) -> NDArray[np.float64]:
@@ -20,7 +20,7 @@ def confidence(
 
     The product of two figures that are both 1 on a clean, closed surface:
 
-    - ``(1 + cos(angle between the normal and the gradient of E_max)) / 2``: do the field and the points agree?
+    - ``(1 + cos(angle between the normal and its witness)) / 2``: do field, or sensors, and the points agree?
     - the jump of the winding number across the point, seen with a kernel one spacing wide: 1 for a plane of evenly
       spaced points, less at gaps, near other sheets and where neighbours point the other way, clipped to [0, 1].
 
@@ -30,8 +30,8 @@ def confidence(
     ----------
     around : Neighbourhood
         Of the points.
-    field : (n, 3) float64
-        Unit gradients of E_max.
+    witnessed : (n, 3) float64
+        As `witness` has it.
     normals : (n, 3) float64
         Final unit normals.
     rows : (k,) intp or slice
@@ -50,5 +50,28 @@ def confidence(
     outward = around.tree.outward(normals, width)[rows]
     # An infinite plane of dipoles has 4 pi |grad w| = 2 pi / eps with the kernel's width eps.
     jump = np.einsum("nd,nd->n", outward, normals[rows]) * spacing[rows] / (2 * np.pi)
-    agreement = 0.5 * (1.0 + np.einsum("nd,nd->n", field[rows], normals[rows]))
+    agreement = 0.5 * (1.0 + np.einsum("nd,nd->n", witnessed[rows], normals[rows]))
     return np.asarray(np.clip(agreement, 0.0, 1.0) * np.clip(jump, 0.0, 1.0))
+
+
+def witness(votes: NDArray[np.float64], seen: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Directions (n, 3) that the sides of normals are held against; zero where there is none.
+
+    Parameters
+    ----------
+    votes : (n, 3) float64
+        What the field says of each normal, outward.
+    seen : (n, 3) float64, optional
+        Directions in which sensors saw the points, zero where none did. The field is no witness then: in a room it
+        points out of the walls.
+
+    Examples
+    --------
+    >>> witness(np.eye(3)[:2], np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 0.0]]))
+    array([[0., 0., 1.],
+           [0., 0., 0.]])
+    """
+    if seen is None:
+        return votes
+    length = np.linalg.norm(seen, axis=1, keepdims=True)
+    return np.asarray(seen / np.where(length > 0, length, 1.0))

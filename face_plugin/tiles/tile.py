@@ -25,7 +25,7 @@ from face_plugin.geometry import local_spacing, unit
 from face_plugin.method import orient, solve_field
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
-from face_plugin.sides.confidence import confidence
+from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.enclosure import enclosed
 from face_plugin.sides.sensors import sights
 from face_plugin.sides.sheets import find_sheets
@@ -192,7 +192,8 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
                 inside &= ~seen_by.any(axis=1)
             found["enclosed"] = inside[own] & ~stray
     with clock("confidence"):
-        found["confidence"] = np.where(stray, 0.0, confidence(around, seen.field.votes, normals, own))
+        witnessed = witness(seen.field.votes, seen_by)
+        found["confidence"] = np.where(stray, 0.0, confidence(around, witnessed, normals, own))
     return {**found, "seconds": _seconds(clock, ORIENT_STAGES)}
 
 

@@ -165,10 +165,9 @@ def refine(
     plate = back_to_back(around, field.votes)
 
     # 1. Side.
-    if sights is None:
-        side = _sides_by_field(around, field, sheets or find_sheets(around), still, plate)
-    else:
-        side = sides_by_sensors(around, sights)
+    side = blind = _sides_by_field(around, field, sheets or find_sheets(around), still, plate)
+    if sights is not None:
+        side = sides_by_sensors(around, sights, unit(blind))
 
     # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending
     # allows, and from a narrow kernel where the points only just resolve the surface.
@@ -184,7 +183,7 @@ def refine(
     refined = level(around.tree, refined, neighbour, turned.width, weight)
     if sights is not None:
         # The angle is known better now, and so is which side of it was seen.
-        refined = resettled(around, refined, sights)
+        refined = resettled(around, refined, sights, unit(blind))
     return np.where(still[:, None], field.votes, refined)
 
 
@@ -202,7 +201,7 @@ def _sides_by_field(
     # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
     for by_sheets in (True, False, False):
         field_says = field.lean * np.einsum("nd,nd->n", votes, side)
-        turned = turned_patches(around, unit(side), field_says, field.strength, by_sheets=by_sheets) & ~kept
+        turned = turned_patches(around, unit(side), field_says, by_sheets=by_sheets) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
     if is_open(field.difference) and not kept.any():

@@ -65,8 +65,8 @@ def field_at_points(
     ball = KDTree(balls.centres).query(points)[1]
     gradient = ball_means(mesh, vertex_gradients(mesh, strength[:, None])[:, :, 0])
     at_balls = ball_means(mesh, strength)
-    change = np.linalg.norm(gradient, axis=1) * balls.radii / np.maximum(at_balls, np.finfo(float).tiny)
-    difference = np.minimum(change / SHIELDED, 1.0)
+    change, shielded = np.linalg.norm(gradient, axis=1) * balls.radii, SHIELDED * at_balls
+    difference = np.minimum(change, shielded) / np.maximum(shielded, np.finfo(float).tiny)
     return FieldAtPoints(at_balls[ball], carry(balls.centres, unit(gradient), points), difference[ball])
 
 

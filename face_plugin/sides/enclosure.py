@@ -15,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import ALPHAS
 
@@ -31,8 +32,14 @@ STEP = 1.0
 # Two layers are apart where there is a gap of this many spacings between heights above the tangent plane: in normally
 # distributed noise as large as the spacing gaps are smaller, out to twice the deviation.
 APART = 0.25
+# Points scatter where their nearest so many lie this many spacings above or below them, at most points around.
+NEAREST = 6
+SCATTER = 0.3
 # Points farther than this many spacings from the normal through a point do not stand above it.
 BESIDE = 2.4
+# The step goes along the mean normal of so many neighbours, less those that face away by more than this cosine.
+AROUND = 12
+ACROSS = -0.5
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
 ENCLOSED_WIDTH = 0.5
 # Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which
@@ -69,6 +76,7 @@ def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDAr
     """
     points, spacing, tree = around.points, around.spacing, around.tree
     width = ENCLOSED_WIDTH * spacing
+    normals = _out_of_creases(around, normals)
     outer = normals
     number = tree.number(outer, width)
     left_out = np.zeros(len(points), dtype=np.bool_)
@@ -79,12 +87,33 @@ def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDAr
             outer = np.where(inner[:, None], 0.0, normals)
             number = tree.number(outer, width)
     found = number > ENCLOSED
-    step = STEP * spacing
-    step[found] += _band(around, normals, np.flatnonzero(found))
-    step_outward = points + step[:, None] * normals
+    rows = np.flatnonzero(found)
+    step_outward = points.copy()
+    band = np.where(_scatters(around, normals, rows), _band(around, normals, rows), 0.0)
+    step_outward[rows] += (STEP * spacing[rows] + band)[:, None] * normals[rows]
     for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
         found &= tree.number(dipoles, np.where(found, width, 0.0), step_outward) > level
     return found
+
+
+def _out_of_creases(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean normals (n, 3) around points: in a sharp crease one normal leads along its other side, and all lead out."""
+    near = normals[around.neighbour[:, : AROUND + 1]]
+    facing = np.einsum("nkd,nd->nk", near, normals) > ACROSS
+    return np.where(normals.any(axis=1)[:, None], unit(np.einsum("nk,nkd->nd", facing, near)), 0.0)
+
+
+def _scatters(around: Neighbourhood, normals: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether (k,) the points around scatter about their sheet, rather than lie in sheets one behind another."""
+    near = around.neighbour[:, 1 : NEAREST + 1]
+    offset = around.points[near] - around.points[:, None]
+    facing = np.einsum("nkd,nd->nk", normals[near], normals) > 0.5
+    height = np.abs(np.einsum("nkd,nd->nk", offset, normals)) * facing
+    scatter = height.sum(axis=1) / np.maximum(facing.sum(axis=1), 1) / around.spacing
+    # Noise is the sensor's, and all over the cloud: where it is not, scatter is a tangle of parts.
+    if np.median(scatter) < SCATTER:
+        return np.zeros(len(rows), dtype=np.bool_)
+    return np.asarray(np.median(scatter[around.neighbour[rows]], axis=1) > SCATTER)
 
 
 def _band(around: Neighbourhood, normals: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.float64]:

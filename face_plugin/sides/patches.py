@@ -25,7 +25,6 @@ from scipy.sparse.csgraph import connected_components
 from face_plugin.geometry import plane_fits
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
-from face_plugin.sides.enclosure import DARK
 from face_plugin.sides.graph import Edges, couplings, neighbours_around
 
 __all__ = ["closure", "sheet_couplings", "turned_patches"]
@@ -78,7 +77,6 @@ def turned_patches(
     around: Neighbourhood,
     normals: NDArray[np.float64],
     field: NDArray[np.float64],
-    strength: NDArray[np.float64],
     *,
     by_sheets: bool,
 ) -> NDArray[np.bool_]:
@@ -92,8 +90,6 @@ def turned_patches(
         Unit normals.
     field : (n,) float64
         What the field says of each normal, in [-1, 1]: positive where it points to the lit side.
-    strength : (n,) float64
-        E_max at the points.
     by_sheets : bool
         Patches of planes through many neighbours and by edges alone, or of the normals as they are.
 
@@ -107,7 +103,7 @@ def turned_patches(
     >>> ball = sphere(2000)
     >>> wrong = ball.points[:, 2] > 0.8
     >>> mixed = np.where(wrong[:, None], -ball.normals, ball.normals)
-    >>> found = turned_patches(Neighbourhood(ball.points), mixed, np.zeros(2000), np.ones(2000), by_sheets=True)
+    >>> found = turned_patches(Neighbourhood(ball.points), mixed, np.zeros(2000), by_sheets=True)
     >>> bool((found == wrong).mean() > 0.99)
     True
     """
@@ -129,13 +125,11 @@ def turned_patches(
     then = closure(around, np.where(inside[:, None], -normals, normals))
     border = _border(patch, count, sign, edges, coupling)
     members = np.bincount(patch[inside], minlength=count)
-    before, after, loss, reached = (
-        np.bincount(patch[inside], values[inside], minlength=count) / members
-        for values in (closed, then, field, strength > DARK)
+    before, after, loss = (
+        np.bincount(patch[inside], values[inside], minlength=count) / members for values in (closed, then, field)
     )
-    # What lies inside others gains as well: a body in another would become a cavity. Little comes of it where parts
-    # cross, and no light gets there: only what then fits together, and is not sealed off, counts in full.
-    gain = np.where(after > before, after * reached, 1.0) * (after - before)
+    # Parts that lie inside others gain as well, but little comes of it: only what then fits together counts in full.
+    gain = np.where(after > before, after, 1.0) * (after - before)
     # The square: a border half of whose edges agree says nothing.
     right = (border > 0) & (BORDER * border**2 + CLOSURE * gain > loss + MARGIN)
     turned[inside] = right[patch[inside]]

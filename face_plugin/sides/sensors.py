@@ -25,8 +25,9 @@ __all__ = ["Sensors", "facing", "resettled", "sensors_of", "sides_by_sensors", "
 
 # A point blocks what is behind it within this share of its spacing: the points of an even sheet cover it.
 COVER = 0.7
-# What is less than this many spacings behind is the same surface, seen at a slant.
-BEHIND = 3.0
+# What is less than this many spacings behind is the same surface, seen at a slant; with more, thin walls are seen
+# through.
+BEHIND = 1.0
 # Points of like apparent size that are looked at in the direction of each.
 LOOKED_AT = 4
 # Octaves of apparent size told apart; larger and smaller ones count as the last.
@@ -213,7 +214,9 @@ def facing(lines: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(np.clip(np.einsum("nd,nd->n", lines, seen), -1.0, 1.0))
 
 
-def sides_by_sensors(around: Neighbourhood, seen: NDArray[np.float64]) -> NDArray[np.float64]:
+def sides_by_sensors(
+    around: Neighbourhood, seen: NDArray[np.float64], blind: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Find unit normals (n, 3) that face what saw them, along whole sheets; lines are those of planes.
 
     Parameters
@@ -222,6 +225,8 @@ def sides_by_sensors(around: Neighbourhood, seen: NDArray[np.float64]) -> NDArra
         Of the points.
     seen : (n, 3) float64
         As `sights` has it.
+    blind : (n, 3) float64, optional
+        Normals found without sensors: where no sensor saw, they count, as far as they agree with what was seen.
 
     Examples
     --------
@@ -233,14 +238,35 @@ def sides_by_sensors(around: Neighbourhood, seen: NDArray[np.float64]) -> NDArra
     True
     """
     lines, edges, coupling = sheet_couplings(around)
-    sign = cluster_signs(len(around), edges, coupling, SIGHT * facing(lines, seen))
+    sign = cluster_signs(len(around), edges, coupling, _evidence(lines, seen, blind))
     return np.asarray(lines * sign[:, None])
 
 
-def resettled(around: Neighbourhood, normals: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.float64]:
+def _evidence(
+    lines: NDArray[np.float64], seen: NDArray[np.float64], blind: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Weigh what tells the sides (n,) of lines: sights, and normals found blind if the sights bear these out.
+
+    A body seen from outside is what its field says it is, also where no sensor looks; a room is its opposite.
+    """
+    evidence = facing(lines, seen)
+    if blind is not None:
+        agreed = facing(blind, seen)
+        borne_out = max(float(agreed.sum() / max(np.abs(agreed).sum(), np.finfo(float).tiny)), 0.0)
+        evidence = evidence + borne_out**2 * np.einsum("nd,nd->n", lines, blind)
+    return np.asarray(SIGHT * evidence)
+
+
+def resettled(
+    around: Neighbourhood,
+    normals: NDArray[np.float64],
+    seen: NDArray[np.float64],
+    blind: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
     """Settle the sides of normals (n, 3) of better angles again, by what was seen (n, 3) and along sheets."""
     edges = neighbours_around(around, normals)
-    sign = cluster_signs(len(around), edges, couplings(around.points, normals, edges), SIGHT * facing(normals, seen))
+    coupling = couplings(around.points, normals, edges)
+    sign = cluster_signs(len(around), edges, coupling, _evidence(normals, seen, blind))
     return np.asarray(normals * sign[:, None])
 
 

@@ -46,8 +46,10 @@ def find_strays(around: Neighbourhood) -> NDArray[np.bool_]:
         nearest = among.neighbour[:, : BULK_NEIGHBOURS + 1]
         flat = np.median(bulk(among.points, among.neighbour)[nearest], axis=1) < SHEET
         lonely[rows[flat & (among.spacing < LONELY * around.spacing[rows])]] = False
-    # What is left must have something to be a stray of.
-    return lonely if np.count_nonzero(~lonely) > BULK_NEIGHBOURS else np.zeros(len(around), dtype=np.bool_)
+    # What is left must have something to be a stray of: not a few points, nor points on a line.
+    rest = around.points[~lonely]
+    spread = np.linalg.eigvalsh(np.cov(rest.T))[1] if len(rest) > BULK_NEIGHBOURS else 0.0
+    return lonely & (spread > np.finfo(float).eps)
 
 
 def without(whole: cloud.Cloud, points: ArrayLike, left_out: NDArray[np.bool_]) -> cloud.Cloud:

@@ -100,7 +100,8 @@ def _out_of_creases(around: Neighbourhood, normals: NDArray[np.float64]) -> NDAr
     """Mean normals (n, 3) around points: in a sharp crease one normal leads along its other side, and all lead out."""
     near = normals[around.neighbour[:, : AROUND + 1]]
     facing = np.einsum("nkd,nd->nk", near, normals) > ACROSS
-    return np.where(normals.any(axis=1)[:, None], unit(np.einsum("nk,nkd->nd", facing, near)), 0.0)
+    known = np.linalg.norm(normals, axis=1, keepdims=True) > 0
+    return np.where(known, unit(np.einsum("nk,nkd->nd", facing, near)), 0.0)
 
 
 def _scatters(around: Neighbourhood, normals: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:

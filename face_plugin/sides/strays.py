@@ -22,7 +22,7 @@ __all__ = ["find_strays", "without"]
 
 # A stray's spacing is more than this many times the median spacing among its neighbours. At random on one surface the
 # largest of 20,000 is 2.2 times as large.
-LONELY = 3.0
+LONELY = 4.0
 # Lonely points that form a sheet of their own are no strays: `bulk` among them is below this, for most of those near.
 SHEET = 0.12
 

@@ -25,6 +25,7 @@ from face_plugin.faraday.solve import SolvedCage, solve_cage
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
+from face_plugin.sides.enclosure import DARK
 from face_plugin.sides.patches import turned_patches
 from face_plugin.sides.sensors import resettled, sides_by_sensors
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
@@ -199,9 +200,11 @@ def _sides_by_field(
     # Stray votes turn round to those around them.
     side = turn_sides(around, votes, field.strength, sheets, kept)
     # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
+    # Of a cloud seen in part, what is sealed off is not judged by how it fits in: most of that is not there.
+    reached = field.strength > DARK if still.any() else None
     for by_sheets in (True, False, False):
         field_says = field.lean * np.einsum("nd,nd->n", votes, side)
-        turned = turned_patches(around, unit(side), field_says, by_sheets=by_sheets) & ~kept
+        turned = turned_patches(around, unit(side), field_says, by_sheets=by_sheets, reached=reached) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
     if is_open(field.difference) and not kept.any():

@@ -38,7 +38,7 @@ SCATTER = 0.3
 # Points farther than this many spacings from the normal through a point do not stand above it.
 BESIDE = 2.4
 # The step goes along the mean normal of so many neighbours, less those that face away by more than this cosine.
-AROUND = 12
+AROUND = 6
 ACROSS = -0.5
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
 ENCLOSED_WIDTH = 0.5
@@ -51,7 +51,12 @@ LEAK_PERCENTILE = 90.0
 ALPHA_BOUNDS = (0.03, 0.3)
 
 
-def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDArray[np.float64]) -> NDArray[np.bool_]:
+def enclosed(
+    around: Neighbourhood,
+    normals: NDArray[np.float64],
+    strength: NDArray[np.float64],
+    near: NDArray[np.bool_] | None = None,
+) -> NDArray[np.bool_]:
     """Which points (n,) the others enclose: the winding number is near 1 there, and still high a step outward.
 
     What lies inside has no outward side and would blur the number. So it is computed again and again, each time without
@@ -65,6 +70,9 @@ def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDAr
     normals : (n, 3) float64
     strength : (n,) float64
         E_max at the points.
+    near : (n,) bool, optional
+        Points that lie as close as the cloud's do; by default all. Others stand for many, and their neighbours are no
+        part of the same surface.
 
     Examples
     --------
@@ -76,7 +84,8 @@ def enclosed(around: Neighbourhood, normals: NDArray[np.float64], strength: NDAr
     """
     points, spacing, tree = around.points, around.spacing, around.tree
     width = ENCLOSED_WIDTH * spacing
-    normals = _out_of_creases(around, normals)
+    smooth = _out_of_creases(around, normals)
+    normals = smooth if near is None else np.where(near[:, None], smooth, normals)
     outer = normals
     number = tree.number(outer, width)
     left_out = np.zeros(len(points), dtype=np.bool_)

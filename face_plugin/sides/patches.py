@@ -79,6 +79,7 @@ def turned_patches(
     field: NDArray[np.float64],
     *,
     by_sheets: bool,
+    reached: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Which points belong to patches that are to be turned as a whole.
 
@@ -92,6 +93,8 @@ def turned_patches(
         What the field says of each normal, in [-1, 1]: positive where it points to the lit side.
     by_sheets : bool
         Patches of planes through many neighbours and by edges alone, or of the normals as they are.
+    reached : (n,) bool, optional
+        Points whose closure counts where it is gained; by default all.
 
     Returns
     -------
@@ -129,7 +132,8 @@ def turned_patches(
         np.bincount(patch[inside], values[inside], minlength=count) / members for values in (closed, then, field)
     )
     # Parts that lie inside others gain as well, but little comes of it: only what then fits together counts in full.
-    gain = np.where(after > before, after, 1.0) * (after - before)
+    counts = np.bincount(patch[inside], reached[inside], minlength=count) / members if reached is not None else 1.0
+    gain = np.where(after > before, after * counts, 1.0) * (after - before)
     # The square: a border half of whose edges agree says nothing.
     right = (border > 0) & (BORDER * border**2 + CLOSURE * gain > loss + MARGIN)
     turned[inside] = right[patch[inside]]

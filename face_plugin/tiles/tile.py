@@ -186,7 +186,7 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     found: dict[str, NDArray[np.generic]] = {"normals": normals[like]}
     with clock("enclosure"):
         if store.interior:
-            inside = enclosed(around, normals, seen.field.strength)
+            inside = enclosed(around, normals, seen.field.strength, seen.near)
             if seen_by is not None:
                 # What a sensor saw does not lie inside anything.
                 inside &= ~seen_by.any(axis=1)

@@ -207,6 +207,9 @@ def _sides_by_field(
         turned = turned_patches(around, unit(side), field_says, by_sheets=by_sheets, reached=reached) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
+        elif not by_sheets:
+            # Asked again of the same sides, it would say the same.
+            break
     if is_open(field.difference) and not kept.any():
         # Parts of an open scan that no sheet joins learn of one another where both are seen.
         side = sides_from_vantage(around, side)

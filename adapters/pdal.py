@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet
-from face_plugin.params import Params
+from face_plugin.params import settings_of
 from face_plugin.sides.sensors import Sensors, sensors_of
 
 __all__ = ["configured", "estimate_normals", "remove_interior"]
@@ -99,15 +99,15 @@ def configured(
     always_up : bool
         All was seen from above, as in most aerial scans; unlike ``filters.normal`` not by default.
     **settings
-        Fields of `face_plugin.Params`.
+        Fields of `face_plugin.Params` and `face_plugin.Execution`.
 
     Examples
     --------
     >>> step = configured(interior=True, alpha="sparse")
     """
-    params, sensors = Params(**settings), sensors_of(_position(viewpoint), None, (0, 0, 1) if always_up else None)
-    steps: list[Filter] = [Normals(params)] if normals else []
-    chain = Chain([*steps, Interior(params=params)] if interior else steps)
+    given, sensors = settings_of(settings), sensors_of(_position(viewpoint), None, (0, 0, 1) if always_up else None)
+    steps: list[Filter] = [Normals(**given)] if normals else []
+    chain = Chain([*steps, Interior(**given)] if interior else steps)
 
     def step(ins: Dimensions, outs: MutableMapping[str, NDArray[Any]]) -> bool:
         return _run(ins, outs, chain, sensors)

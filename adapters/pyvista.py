@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from face_plugin.errors import MissingDependencyError, require
 from face_plugin.estimate import reconstruct
+from face_plugin.execution import Execution
 from face_plugin.filters import Normals, PointSet
 from face_plugin.params import Params
 from face_plugin.sides.sensors import sensors_of
@@ -65,6 +66,7 @@ class FaceAccessor:
         viewpoints: ArrayLike | None = None,
         seen_from: ArrayLike | None = None,
         up: ArrayLike | None = None,
+        execution: Execution | None = None,
     ) -> Any:
         """Give the points outward unit normals, as the active normals, named "Normals" as PyVista's own.
 
@@ -75,6 +77,7 @@ class FaceAccessor:
             Change the dataset, or return a copy, as PyVista's filters do.
         viewpoints, seen_from, up
             Where sensors stood, as in `face_plugin.estimate_normals`.
+        execution : Execution, optional
 
         Returns
         -------
@@ -88,7 +91,7 @@ class FaceAccessor:
         """
         result = self._dataset if inplace else self._dataset.copy()
         layer = PointSet(np.asarray(result.points), sensors=sensors_of(viewpoints, seen_from, up))
-        normals = Normals(params)(layer).normals
+        normals = Normals(params, execution=execution)(layer).normals
         result.point_data["Normals"] = np.array(normals)
         result.point_data.active_normals_name = "Normals"
         return result

@@ -162,7 +162,7 @@ def proportional_memory(pid: int) -> float:
 
 def measure(path: str, tile_points: int | None = None, workers: int | None = None) -> None:
     """Measure one run, and print it as the last line."""
-    from face_plugin import Params, estimate_normals
+    from face_plugin import Execution, estimate_normals
     from face_plugin.shapes import sphere
 
     with np.load(path) as arrays:
@@ -172,7 +172,7 @@ def measure(path: str, tile_points: int | None = None, workers: int | None = Non
     reference = Path(path).with_suffix(".one.npz")
     cpu, own, start = cpu_seconds(), time.process_time(), time.perf_counter()
     if tile_points is None:
-        result = estimate_normals(points, Params(tile_points=len(points)))
+        result = estimate_normals(points, execution=Execution(tile_points=len(points)))
         normals, timings, tile, record = result.normals, result.timings, None, {}
     else:
         normals, timings, tile, record = solve_in_tiles(points, tile_points, workers)
@@ -211,15 +211,15 @@ def solve_in_tiles(
     points: NDArray[np.float64], tile_points: int, workers: int | None
 ) -> tuple[NDArray[np.float64], dict[str, float], NDArray[np.int64], dict[str, Any]]:
     """Solve in tiles as `estimate_normals` does, and tell as well which tile owns each point (n,)."""
-    from face_plugin import Params
+    from face_plugin import Execution, Params
     from face_plugin.io.sources import ArraySource
     from face_plugin.tiles.run import collect, solve_store, tile_seconds
 
     engine = "serial" if workers == 1 else "processes"
-    params = Params(tile_points=tile_points, workers=workers, engine=engine)
+    execution = Execution(tile_points=tile_points, workers=workers, engine=engine)
     with tempfile.TemporaryDirectory(prefix="face-") as name:
         folder = Path(name)
-        store, timings = solve_store(folder, ArraySource(points), params)
+        store, timings = solve_store(folder, ArraySource(points), Params(), execution=execution)
         start = time.perf_counter()
         normals = collect(store)["normals"]
         timings = {**timings, "merge": time.perf_counter() - start, **tile_seconds(store)}

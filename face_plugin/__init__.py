@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from face_plugin.errors import FaceError, MeshingError, MissingDependencyError
     from face_plugin.estimate import estimate_normals, orient_normals, reconstruct
+    from face_plugin.execution import Execution
     from face_plugin.params import Params
     from face_plugin.result import Result, Surface
     from face_plugin.solver import FaCE
 
 __version__ = "0.2.0"
 __all__ = [
+    "Execution",
     "FaCE",
     "FaceError",
     "MeshingError",
@@ -36,6 +38,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "Execution": "execution",
     "FaCE": "solver",
     "FaceError": "errors",
     "MeshingError": "errors",

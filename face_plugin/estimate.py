@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
-from face_plugin.params import Params, checked
+from face_plugin.execution import EngineLike, Execution
+from face_plugin.params import Params, settled
 from face_plugin.result import Result, Surface, kept_points
 from face_plugin.sculpt import SculptFile
 from face_plugin.sides.given import checked_trust, given_lines
@@ -18,7 +19,7 @@ from face_plugin.sides.sensors import Sensors, sensors_of
 from face_plugin.solver import FaCE
 from face_plugin.stages import Progress
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
-from face_plugin.tiles.plan import EngineLike, check_one_piece, in_tiles
+from face_plugin.tiles.plan import check_one_piece, in_tiles
 from face_plugin.tiles.tiled import Tiled
 
 __all__ = ["estimate_normals", "orient_normals", "reconstruct", "solve", "solve_whole"]
@@ -30,14 +31,14 @@ def solve(
     *,
     sensors: Sensors | None = None,
     classify: bool = False,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
     progress: Progress | None = None,
 ) -> FaCE | Tiled:
-    """Solve a cloud of any size, in one piece or in tiles as `Params.tile_points` and the memory say.
+    """Solve a cloud of any size, in one piece or in tiles as `Execution.tile_points` and the memory say.
 
     Parameters
     ----------
-    points, params, engine, progress
+    points, params, execution, progress
         As of `estimate_normals`.
     sensors : Sensors, optional
         Where sensors stood.
@@ -50,10 +51,10 @@ def solve(
     >>> type(solve(sphere(500).points)).__name__
     'FaCE'
     """
-    array, given = cloud.as_points(points), checked(params)
-    if in_tiles(len(array), given):
-        return Tiled(array, params, sensors=sensors, classify=classify, engine=engine, progress=progress)
-    return FaCE(array, params, sensors=sensors, progress=progress)
+    array, (params, execution) = cloud.as_points(points), settled(params, execution)
+    if in_tiles(len(array), execution):
+        return Tiled(array, params, sensors=sensors, classify=classify, execution=execution, progress=progress)
+    return FaCE(array, params, sensors=sensors, execution=execution, progress=progress)
 
 
 def solve_whole(
@@ -62,13 +63,14 @@ def solve_whole(
     *,
     purpose: str,
     sensors: Sensors | None = None,
+    execution: Execution | None = None,
     progress: Progress | None = None,
 ) -> FaCE:
     """Solve a cloud in one piece, whatever its size: for edits, and for the field at any position.
 
     Parameters
     ----------
-    points, params, progress
+    points, params, execution, progress
         As of `estimate_normals`.
     sensors : Sensors, optional
         Where sensors stood.
@@ -80,9 +82,9 @@ def solve_whole(
     ValueError
         There is not the memory for it.
     """
-    array = cloud.as_points(points)
-    check_one_piece(len(array), checked(params), purpose)
-    return FaCE(array, params, sensors=sensors, progress=progress)
+    array, (params, execution) = cloud.as_points(points), settled(params, execution)
+    check_one_piece(len(array), execution, purpose)
+    return FaCE(array, params, sensors=sensors, execution=execution, progress=progress)
 
 
 def estimate_normals(
@@ -94,12 +96,13 @@ def estimate_normals(
     seen_from: ArrayLike | None = None,
     up: ArrayLike | None = None,
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
+    engine: EngineLike | None = None,
     progress: Progress | None = None,
 ) -> Result:
     """Outward normals of an unoriented point cloud by Faraday cage estimation.
 
-    Large clouds are solved in tiles, as `Params.tile_points` says; see `face_plugin.tiles`.
+    Large clouds are solved in tiles, as `Execution.tile_points` says; see `face_plugin.tiles`.
 
     Parameters
     ----------
@@ -117,8 +120,10 @@ def estimate_normals(
         Direction from which all was seen, from afar: of aerial scans.
     sculpt : SculptFile or path, optional
         Charges and cage points to apply. The cloud is then solved in one piece, whatever its size.
+    execution : Execution, optional
+        In tiles of which size, by whom, and with how much memory.
     engine : str, Engine or distributed.Client, optional
-        Who solves tiles; by default `Params.engine`.
+        Deprecated: `Execution.engine`.
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -142,13 +147,16 @@ def estimate_normals(
     True
     """
     sensors = sensors_of(viewpoints, seen_from, up)
+    params, execution = settled(params, execution, engine)
     if sculpt is None:
-        solved = solve(points, params, sensors=sensors, classify=filter_interior, engine=engine, progress=progress)
+        solved = solve(
+            points, params, sensors=sensors, classify=filter_interior, execution=execution, progress=progress
+        )
         return solved.result(filter_interior=filter_interior)
     if not isinstance(sculpt, SculptFile):
         # A bad file is said before the cage is solved.
         sculpt = SculptFile.load(sculpt)
-    face = solve_whole(points, params, purpose="sculpting", sensors=sensors, progress=progress)
+    face = solve_whole(points, params, purpose="sculpting", sensors=sensors, execution=execution, progress=progress)
     return face.sculpted(sculpt).result(filter_interior=filter_interior)
 
 
@@ -161,14 +169,15 @@ def orient_normals(
     seen_from: ArrayLike | None = None,
     up: ArrayLike | None = None,
     trusted: ArrayLike | None = None,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
+    engine: EngineLike | None = None,
     progress: Progress | None = None,
 ) -> NDArray[np.floating]:
     """Turn the signs of normals that are given, so that they point outward; their lines stay as they are.
 
     Parameters
     ----------
-    points, params, viewpoints, seen_from, up, engine, progress
+    points, params, viewpoints, seen_from, up, execution, engine, progress
         As in `estimate_normals`, whose normals tell the side of each line; it is then settled along sheets.
     normals : (n, 3) array_like
         Of any length but 0 and of either sign.
@@ -197,10 +206,11 @@ def orient_normals(
     True
     """
     array, sensors = cloud.as_points(points), sensors_of(viewpoints, seen_from, up)
+    params, execution = settled(params, execution, engine)
     # Bad normals are said before the cage is solved.
     given_lines(normals, len(array))
     checked_trust(trusted, len(array))
-    solved = solve(array, params, sensors=sensors, engine=engine, progress=progress)
+    solved = solve(array, params, sensors=sensors, execution=execution, progress=progress)
     return solved.oriented(normals, trusted)
 
 
@@ -217,14 +227,15 @@ def reconstruct(
     backend: Backend | None = None,
     trim: float = 0.0,
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
+    engine: EngineLike | None = None,
     progress: Progress | None = None,
 ) -> Surface:
     """Reconstruct a closed surface: outward normals, interior points dropped, Poisson reconstruction.
 
     Parameters
     ----------
-    points, params, viewpoints, seen_from, up, sculpt, engine, progress
+    points, params, viewpoints, seen_from, up, sculpt, execution, engine, progress
         As in `estimate_normals`.
     screened : bool
         Screened Poisson reconstruction, which passes nearer to the points, or the smoother unscreened one.
@@ -249,6 +260,7 @@ def reconstruct(
     3
     """
     backend = check_arguments(depth, backend, trim)
+    params, execution = settled(params, execution, engine)
     result = estimate_normals(
         points,
         params,
@@ -257,7 +269,7 @@ def reconstruct(
         seen_from=seen_from,
         up=up,
         sculpt=sculpt,
-        engine=engine,
+        execution=execution,
         progress=progress,
     )
     array = cloud.as_points(points)

@@ -55,6 +55,7 @@ def solve_field(
     box: Box | None = None,
     given: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     cage_value: NDArray[np.float64] | None = None,
+    memory: float | None = None,
     stage: Stage = nullcontext,
 ) -> Solved:
     """From points to the field around them.
@@ -66,7 +67,7 @@ def solve_field(
     params : Params
     scale : float
         Length of the canonical frame's unit in that of the input.
-    box, given, cage_value, stage
+    box, given, cage_value, memory, stage
         As of `face_plugin.faraday.solve.solve_cage`; the stage "field" follows.
     """
     # Where balls go: near-duplicates are left out, and points on sheets with nothing else near.
@@ -77,7 +78,9 @@ def solve_field(
     # The neighbours take a tenth of the memory of what follows: who needs them no more need not hold them.
     del around
     # Balls (3.1), the box around them, the mesh between, and the potential of three basis fields (3.2).
-    cage = solve_cage(points, separation, params, box=box, given=given, cage_value=cage_value, stage=stage)
+    cage = solve_cage(
+        points, separation, params, box=box, given=given, cage_value=cage_value, memory=memory, stage=stage
+    )
     # The greatest strength that an external field of any direction causes (3.3).
     with stage("field"):
         strength = field.strength(cage.mesh, cage.potential, params.directions)

@@ -1,14 +1,18 @@
-"""All settings in one place."""
+"""The settings of the method. Who computes it, and with how much, is told by `face_plugin.execution`."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import numbers
-from dataclasses import dataclass, fields
+import warnings
+from collections.abc import Mapping
+from dataclasses import InitVar, dataclass, fields
 from typing import Any, Literal, get_args
 
-__all__ = ["ALPHAS", "Params", "checked"]
+from face_plugin.checks import check_integer, check_number
+from face_plugin.execution import Execution
+
+__all__ = ["ALPHAS", "Params", "settings_of", "settled"]
 
 Alpha = Literal["auto", "dense", "sparse"]
 
@@ -24,9 +28,8 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "inside": ("rays", "winding"),
 }
 
-ENGINES = ("auto", "serial", "processes", "dask")
-SMALLEST_TILE = 1000
-"""A smaller tile would consist of its halo."""
+MOVED = tuple(field.name for field in fields(Execution))
+"""What was a setting of the method once."""
 
 
 @dataclass(frozen=True)
@@ -85,47 +88,43 @@ class Params:
     """Test of a point against the isosurface: embree rays, or the winding number. Tiles need neither: a point is inside
     where the field at it is below alpha."""
 
-    # Large clouds
-    tile_points: int | None = None
-    """Points of a tile, >= 1000; a cloud of no more is solved in one piece; None = tiles of 40,000 above 100,000."""
-    max_memory: float | None = None
-    """Memory that all processes together may take, in gigabytes (1e9 bytes); None = half of what is free."""
-    engine: str = "auto"
-    """Who solves tiles: "serial" = this process, "processes" = several of this machine, "dask" = Dask's workers, or
-    the address of a Dask scheduler; "auto" is "processes" where more than one fits."""
-    workers: int | None = None
-    """Tiles solved at a time, >= 1; None = as many as there are cores."""
+    # Moved to `Execution`; as arguments they are still taken, with a warning.
+    tile_points: InitVar = None  # type: ignore[type-arg]  # Python 3.10 cannot look up the hint of a typed one
+    max_memory: InitVar = None  # type: ignore[type-arg]
+    engine: InitVar = None  # type: ignore[type-arg]
+    workers: InitVar = None  # type: ignore[type-arg]
 
     # Everything
     seed: int = 0
     """Seed of the random turns, jitters and orders; >= 0."""
 
-    def __post_init__(self) -> None:
-        _number(self, "ball_radius", 0.0, 0.5)
-        _number(self, "padding", 0.0, 100.0)
-        _number(self, "least_side", 0.0, 1.0, closed=True, least=True)
-        _number(self, "grading", 0.0, 2.0, closed=True)
-        _number(self, "finest", 0.0, 10.0, closed=True)
+    def __post_init__(self, tile_points: object, max_memory: object, engine: object, workers: object) -> None:
+        check_number(self, "ball_radius", 0.0, 0.5)
+        check_number(self, "padding", 0.0, 100.0)
+        check_number(self, "least_side", 0.0, 1.0, closed=True, least=True)
+        check_number(self, "grading", 0.0, 2.0, closed=True)
+        check_number(self, "finest", 0.0, 10.0, closed=True)
         if self.cage_spacing is not None:
-            _number(self, "cage_spacing", 0.0, math.inf, least=True)
+            check_number(self, "cage_spacing", 0.0, math.inf, least=True)
         if isinstance(self.alpha, str):
             if self.alpha not in get_args(Alpha):
                 raise ValueError(f"alpha must be a number or one of {get_args(Alpha)}, found {self.alpha!r}")
         else:
-            _number(self, "alpha", 0.0, 1.0)
+            check_number(self, "alpha", 0.0, 1.0)
         for name, allowed in CHOICES.items():
             # Of an array, `in` would ask for the truth.
             if not isinstance(getattr(self, name), str) or getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {allowed}, found {getattr(self, name)!r}")
-        _integer(self, "seed", 0)
-        if self.tile_points is not None:
-            _integer(self, "tile_points", SMALLEST_TILE)
-        if self.max_memory is not None:
-            _number(self, "max_memory", 0.0, math.inf)
-        if self.workers is not None:
-            _integer(self, "workers", 1)
-        if not isinstance(self.engine, str) or (self.engine not in ENGINES and "://" not in self.engine):
-            raise ValueError(f"engine must be one of {ENGINES} or an address, found {self.engine!r}")
+        check_integer(self, "seed", 0)
+        given = zip(MOVED, (tile_points, max_memory, engine, workers), strict=True)
+        moved: dict[str, Any] = {name: value for name, value in given if value is not None}
+        if moved:
+            execution = Execution(**moved)
+            moved = {name: getattr(execution, name) for name in moved}
+            _warn_of_moved(moved, stacklevel=4)
+            for name, value in moved.items():
+                # Read by `settled`, and by `dataclasses.replace`.
+                object.__setattr__(self, name, value)
 
     @classmethod
     def paper(cls, **changes: Any) -> Params:
@@ -158,45 +157,68 @@ class Params:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
-def checked(params: Params | None) -> Params:
-    """Return the settings, the default ones for None.
+def settled(
+    params: Params | None, execution: Execution | None = None, engine: object = None
+) -> tuple[Params, Execution]:
+    """Return the settings of the method and those of its execution, the default ones for None.
+
+    Parameters
+    ----------
+    params : Params, optional
+        What it still says of the execution goes there.
+    execution : Execution, optional
+    engine : str, Engine or distributed.Client, optional
+        From where it was an argument: `execution` has it now.
 
     Raises
     ------
     TypeError
-        It is something else, such as a dict.
+        One of them is something else, such as a dict.
+    ValueError
+        The same is said in two places.
 
     Examples
     --------
-    >>> checked(None) == Params()
+    >>> settled(None) == (Params(), Execution())
     True
     """
-    if params is None:
-        return Params()
-    if not isinstance(params, Params):
-        hint = ": pass face_plugin.Params(**settings)" if isinstance(params, dict) else ""
-        raise TypeError(f"params must be a face_plugin.Params or None, found {type(params).__name__}{hint}")
-    return params
+    for name, kind, value in (("params", Params, params), ("execution", Execution, execution)):
+        if value is not None and not isinstance(value, kind):
+            hint = f": pass face_plugin.{kind.__name__}(**settings)" if isinstance(value, dict) else ""
+            raise TypeError(f"{name} must be a face_plugin.{kind.__name__} or None, found {type(value).__name__}{hint}")
+    params = params or Params()
+    moved = {name: getattr(params, name) for name in MOVED if getattr(params, name) is not None}
+    if moved:
+        params = Params(**params.to_dict())
+    if engine is not None:
+        _warn_of_moved({"engine": engine}, stacklevel=4)
+        # Where it is given in both of the old places, the argument counts.
+        moved["engine"] = engine
+    if execution is None:
+        return params, Execution(**moved)
+    if moved:
+        raise ValueError(f"{', '.join(moved)} must be given in execution alone, found execution and the old place")
+    return params, execution
 
 
-def _integer(params: Params, name: str, least: int) -> None:
-    """Raise unless the field is an integer of at least `least`."""
-    value = getattr(params, name)
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
-        raise ValueError(f"{name} must be an integer >= {least}, found {value!r}")
-    object.__setattr__(params, name, int(value))
+def settings_of(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Sort settings by their names into the arguments `params` and `execution`; what nothing is said of is not there.
+
+    Examples
+    --------
+    >>> settings_of({"workers": 2})
+    {'execution': Execution(tile_points=None, max_memory=None, engine='auto', workers=2)}
+    """
+    execution = {name: value for name, value in values.items() if name in MOVED}
+    params = {name: value for name, value in values.items() if name not in MOVED}
+    settings: dict[str, Any] = {"params": Params(**params)} if params else {}
+    return settings | ({"execution": Execution(**execution)} if execution else {})
 
 
-def _number(params: Params, name: str, low: float, high: float, *, closed: bool = False, least: bool = False) -> None:
-    """Raise unless the field is a number in (low, high); `closed` admits `high`, `least` admits `low`."""
-    value = getattr(params, name)
-    span = f"{'[' if least else '('}{low:g}, {high:g}{']' if closed else ')'}"
-    try:
-        number = math.nan if isinstance(value, bool) or not isinstance(value, numbers.Real) else float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ValueError(f"{name} must be a finite number in {span}, found {value!r}")
-    if not (low < number < high or (least and number == low) or (closed and number == high)):
-        raise ValueError(f"{name} must be in {span}, found {value!r}")
-    object.__setattr__(params, name, number)
+def _warn_of_moved(moved: dict[str, Any], stacklevel: int) -> None:
+    arguments = ", ".join(f"{name}={value!r}" for name, value in moved.items())
+    warnings.warn(
+        f"{', '.join(moved)}: no longer a setting of the method; pass execution=face_plugin.Execution({arguments})",
+        DeprecationWarning,
+        stacklevel=stacklevel,
+    )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
+from face_plugin.execution import Execution
 from face_plugin.faraday import field
 from face_plugin.faraday.gradient import FieldAtPoints, field_at_points
 from face_plugin.faraday.isosurface import shielded
@@ -17,7 +18,7 @@ from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.solve import SolvedCage
 from face_plugin.method import orient, solve_field
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.params import Params
+from face_plugin.params import Params, settled
 from face_plugin.result import Result
 from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sculpt.sculptor import Sculptor
@@ -99,6 +100,8 @@ class FaCE(Sculptable):
     params : Params, optional
     sensors : Sensors, optional
         Where sensors stood: normals then point to what they saw.
+    execution : Execution, optional
+        Its `max_memory` bounds the mesh; a `FaCE` is always one piece.
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -130,9 +133,10 @@ class FaCE(Sculptable):
         params: Params | None = None,
         *,
         sensors: Sensors | None = None,
+        execution: Execution | None = None,
         progress: Progress | None = None,
     ) -> None:
-        self.params = params or Params()
+        self.params, self.execution = settled(params, execution)
         clock = Clock(progress)
         self.timings = clock.seconds
         with clock("cloud"):
@@ -146,7 +150,7 @@ class FaCE(Sculptable):
                 self.cloud = without(self.cloud, points, self.strays)
                 around = Neighbourhood(self.cloud.points)
         self.frame = self.cloud.frame
-        solved = solve_field(around, self.params, self.frame.scale, stage=clock)
+        solved = solve_field(around, self.params, self.frame.scale, memory=self.execution.memory, stage=clock)
         self.balls, self.mesh, self.poisson = solved.cage.balls, solved.cage.mesh, solved.cage.poisson
         strength_of = partial(field.strength, self.mesh, directions=self.params.directions)
         self._sculptor = Sculptor(

@@ -8,21 +8,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
+from face_plugin.execution import Execution
 from face_plugin.filters.pointset import PointSet
-from face_plugin.params import Params
+from face_plugin.params import Params, settings_of
 from face_plugin.stages import Progress
 
 __all__ = ["Filter"]
 
 Step = TypeVar("Step", bound="Filter")
-PARAMS = {field.name for field in dataclasses.fields(Params)}
+SETTINGS: dict[str, Any] = {"params": Params, "execution": Execution}
+"""Fields of a step whose own fields stand beside the step's in a file."""
 
 
 @dataclass(frozen=True)
 class Filter(ABC):
     """A step of a chain: a frozen dataclass of its settings, called with a `PointSet`.
 
-    A step that solves a cage has a field ``params``; in a file the settings of `Params` stand beside its own.
+    A step that solves a cage has the fields ``params`` and ``execution``; in a file the settings of `Params` and
+    `Execution` stand beside its own.
 
     Examples
     --------
@@ -48,9 +51,9 @@ class Filter(ABC):
         ValueError
             An option is unknown, missing, or out of range; the message names it.
         """
-        own = {field.name: field for field in dataclasses.fields(cls) if field.name != "params"}
-        has_params = any(field.name == "params" for field in dataclasses.fields(cls))
-        allowed = {*own, *(PARAMS if has_params else ())}
+        own = {field.name: field for field in dataclasses.fields(cls) if field.name not in SETTINGS}
+        kinds = [SETTINGS[field.name] for field in dataclasses.fields(cls) if field.name in SETTINGS]
+        allowed = {*own, *(field.name for kind in kinds for field in dataclasses.fields(kind))}
         if unknown := sorted(options.keys() - allowed):
             raise ValueError(f"unknown option {unknown[0]!r}; allowed are {', '.join(sorted(allowed))}")
         for name, field in own.items():
@@ -58,17 +61,15 @@ class Filter(ABC):
                 raise ValueError(f"the option {name!r} is missing")
         settings = {name: value for name, value in options.items() if name not in own}
         arguments = {name: value for name, value in options.items() if name in own}
-        if settings:
-            arguments["params"] = Params(**settings)
-        return cls(**arguments)
+        return cls(**arguments, **settings_of(settings))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the name of the step and the settings that differ from their defaults, as plain values."""
         result: dict[str, Any] = {"filter": self.name}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, Params):
-                default = Params().to_dict()
+            if isinstance(value, (Params, Execution)):
+                default = type(value)().to_dict()
                 result |= {name: item for name, item in value.to_dict().items() if item != default[name]}
             elif value != field.default:
                 result[field.name] = value

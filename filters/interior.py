@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from face_plugin.execution import Execution
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
@@ -23,6 +24,8 @@ class Interior(Filter):
         Field strength below which space counts as inside, as in `Params`; another value needs no new solve.
     params : Params, optional
         By default those of the cage solved so far, or the package's.
+    execution : Execution, optional
+        Where a cage is solved: in tiles of which size, by whom, and with how much memory.
 
     Examples
     --------
@@ -36,6 +39,7 @@ class Interior(Filter):
     name: ClassVar[str] = "interior"
     alpha: float | str | None = None
     params: Params | None = None
+    execution: Execution | None = None
 
     def __post_init__(self) -> None:
         if self.alpha is not None:
@@ -45,7 +49,7 @@ class Interior(Filter):
 
     def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
         """Return `layer` with the interior points out of ``keep``; normals stay as they are."""
-        cage = layer.replace(classify=True).solved(self.params, progress)
+        cage = layer.replace(classify=True).solved(self.params, progress, execution=self.execution)
         inside = layer.scatter(cage.interior(self.alpha))
         keep = layer.keep & ~inside & ~layer.scatter(cage.strays)
         return layer.replace(keep=keep, attributes={**layer.attributes, "interior": inside})

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from numpy.typing import ArrayLike
 
+from face_plugin.execution import Execution
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
@@ -43,6 +44,8 @@ class Normals(Filter):
         Where sensors stood, in the unit of the points. In a chain the steps before see them as well.
     up : (3,) array_like, optional
         Direction from which all was seen, from afar.
+    execution : Execution, optional
+        Where a cage is solved: in tiles of which size, by whom, and with how much memory.
 
     Examples
     --------
@@ -57,6 +60,7 @@ class Normals(Filter):
     params: Params | None = None
     viewpoints: ArrayLike | None = None
     up: ArrayLike | None = None
+    execution: Execution | None = None
 
     def __post_init__(self) -> None:
         sensors = self.sensors
@@ -74,7 +78,7 @@ class Normals(Filter):
     def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
         """Return `layer` with normals; those of points not kept are zero."""
         layer = with_sensors(layer, self.sensors)
-        cage = layer.solved(self.params, progress)
+        cage = layer.solved(self.params, progress, execution=self.execution)
         result = cage.result()
         attributes = {
             **layer.attributes,

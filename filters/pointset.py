@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from face_plugin.cloud import as_points
 from face_plugin.estimate import solve
+from face_plugin.execution import Execution
 from face_plugin.params import Params
 from face_plugin.sides.sensors import Sensors
 from face_plugin.solver import FaCE
@@ -131,7 +132,9 @@ class PointSet:
             sensors=self.sensors_of_kept(),
         )
 
-    def solved(self, params: Params | None = None, progress: Progress | None = None) -> FaCE | Tiled:
+    def solved(
+        self, params: Params | None = None, progress: Progress | None = None, *, execution: Execution | None = None
+    ) -> FaCE | Tiled:
         """Return the cage of the kept points: the one at hand, unless `params` asks for another."""
         if self.cage is not None and (params is None or params == self.cage.params):
             return self.cage
@@ -140,6 +143,7 @@ class PointSet:
             params,
             sensors=self.sensors_of_kept(),
             classify=self.classify,
+            execution=execution,
             progress=progress,
         )
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from face_plugin.estimate import solve_whole
+from face_plugin.execution import Execution
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.params import Params
@@ -27,6 +28,8 @@ class Sculpt(Filter):
     params : Params, optional
         By default those of the cage solved so far, or the package's. A later step with other ones solves
         anew and has no edits.
+    execution : Execution, optional
+        Where a cage is solved: with how much memory.
 
     Examples
     --------
@@ -45,6 +48,7 @@ class Sculpt(Filter):
     name: ClassVar[str] = "sculpt"
     file: str
     params: Params | None = None
+    execution: Execution | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.file, str) or not self.file:
@@ -60,7 +64,7 @@ class Sculpt(Filter):
         OSError
             The file cannot be read.
         """
-        cage = layer.solved(self.params, progress)
+        cage = layer.solved(self.params, progress, execution=self.execution)
         if not isinstance(cage, FaCE):
             # Edits need the one mesh that they are made in, whatever its size.
             cage = solve_whole(
@@ -68,13 +72,16 @@ class Sculpt(Filter):
                 cage.params,
                 purpose="sculpting",
                 sensors=layer.sensors_of_kept(),
+                execution=cage.execution,
                 progress=progress,
             )
         return layer.replace(cage=cage.sculpted(self.file))
 
 
-def sculpted(layer: PointSet, file: str | os.PathLike[str] | None, params: Params | None = None) -> PointSet:
+def sculpted(layer: PointSet, file: str | os.PathLike[str] | None, **settings: Any) -> PointSet:
     """Return `layer` with the edits of a sculpt file; as it is where that is None. For adapters.
+
+    `settings` are the `params` and `execution` of `Sculpt`.
 
     Examples
     --------
@@ -83,4 +90,4 @@ def sculpted(layer: PointSet, file: str | os.PathLike[str] | None, params: Param
     >>> sculpted(layer, None) is layer
     True
     """
-    return layer if file is None else Sculpt(os.fspath(file), params)(layer)
+    return layer if file is None else Sculpt(os.fspath(file), **settings)(layer)

@@ -5,7 +5,7 @@ import builtins
 import numpy as np
 import pytest
 
-from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin import Execution, Params, estimate_normals, reconstruct
 from face_plugin.adapters import pymeshlab as face
 from face_plugin.shapes import box, nested_box, torus
 
@@ -106,7 +106,7 @@ def test_a_large_layer_is_solved_in_tiles():
     points = torus(2200).points
     ms.add_mesh(ml.Mesh(points))
     face.compute_normal_by_faraday_cage(ms, tile_points=1200, engine="serial")
-    expected = estimate_normals(points, Params(tile_points=1200, engine="serial")).normals
+    expected = estimate_normals(points, execution=Execution(tile_points=1200, engine="serial")).normals
     assert np.array_equal(ms.current_mesh().vertex_normal_matrix(), expected)
     assert not np.array_equal(expected, estimate_normals(points).normals)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import os
 import resource
@@ -13,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from face_plugin import Params, shapes
+from face_plugin import Execution, shapes
 from face_plugin.io import disk
 from face_plugin.tiles import files
 from face_plugin.tiles.engines import Serial
 from face_plugin.tiles.files import normals_of_file, work_folder
 
-PARAMS = Params(tile_points=1250, engine="serial")
+EXECUTION = Execution(tile_points=1250, engine="serial")
 FACE = [sys.executable, "-m", "face_plugin.app.cli"]
 
 
@@ -62,7 +63,7 @@ def test_a_full_disk_names_the_output_and_keeps_the_old_one(source, tmp_path, mo
 
     monkeypatch.setattr(os, "posix_fallocate", fill_up)
     with pytest.raises(OSError, match="No space left") as caught:
-        normals_of_file(source, out, PARAMS)
+        normals_of_file(source, out, execution=EXECUTION)
     assert caught.value.filename == str(out)
     assert out.read_bytes() == b"what was there"
     # Tiles that are done are worth keeping; what came before them is not.
@@ -96,15 +97,15 @@ def test_one_run_at_a_time_into_an_output(source, tmp_path, monkeypatch):
                 asked.append(sorted(path.name for path in Path(folder).iterdir()))
                 for resume in (False, True):
                     with pytest.raises(BlockingIOError, match=f"another run is writing {out}"):
-                        normals_of_file(source, out, PARAMS, resume=resume)
+                        normals_of_file(source, out, execution=EXECUTION, resume=resume)
                 asked.append(sorted(path.name for path in Path(folder).iterdir()))
             super().run(job, folder, tiles, done)
 
-    assert normals_of_file(source, out, PARAMS, engine=Another()).written == 2500
+    assert normals_of_file(source, out, execution=dataclasses.replace(EXECUTION, engine=Another())).written == 2500
     assert asked[0] == asked[1]
     assert not folder.exists()
     assert sorted(os.listdir(tmp_path)) == ["in.npy", "out.npy"]
-    assert normals_of_file(source, out, PARAMS).written == 2500
+    assert normals_of_file(source, out, execution=EXECUTION).written == 2500
 
 
 def test_the_lock_goes_with_the_run_that_held_it(tmp_path):
@@ -158,11 +159,11 @@ class Stopping(Serial):
 def test_damaged_work_is_not_gone_on_from(source, tmp_path, damaged, harm):
     out = tmp_path / "out.npy"
     with pytest.raises(KeyboardInterrupt):
-        normals_of_file(source, out, PARAMS, engine=Stopping())
+        normals_of_file(source, out, execution=dataclasses.replace(EXECUTION, engine=Stopping()))
     (path,) = work_folder(out).glob(f"{damaged}*")
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 3] if harm == "cut" else b"\x93" + bytes(len(content) - 1))
     with pytest.raises(ValueError, match=rf"{path.name}: nothing to go on from \(.*: remove .*, or do not resume"):
-        normals_of_file(source, out, PARAMS, resume=True)
-    assert normals_of_file(source, out, PARAMS).written == 2500
+        normals_of_file(source, out, execution=EXECUTION, resume=True)
+    assert normals_of_file(source, out, execution=EXECUTION).written == 2500
     assert files.work_folder(out).exists() is False

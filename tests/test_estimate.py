@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from face_plugin import FaCE, MeshingError, Params, estimate_normals, shapes
+from face_plugin import Execution, FaCE, MeshingError, Params, estimate_normals, shapes
 from face_plugin.app.viewer.session import Session
 from face_plugin.estimate import solve, solve_whole
 from face_plugin.faraday import solve as solving
@@ -15,15 +15,16 @@ from face_plugin.sculpt import SculptFile
 from face_plugin.tiles import Tiled
 
 BALL = shapes.sphere(1500, 0)
-TILES = Params(tile_points=1000, engine="serial", angles="field")
+FIELD = Params(angles="field")
+TILES = Execution(tile_points=1000, engine="serial")
 # A tile of a thousand points fits, and 1500 in one piece do not.
-LITTLE = Params(max_memory=0.34, engine="serial")
+LITTLE = Execution(max_memory=0.34, engine="serial")
 
 
 def test_one_piece_or_tiles_by_the_number_of_points():
-    assert isinstance(solve(BALL.points[:1000], TILES), FaCE)
-    assert isinstance(solve(BALL.points, TILES), Tiled)
-    assert isinstance(solve(BALL.points, LITTLE), Tiled)
+    assert isinstance(solve(BALL.points[:1000], FIELD, execution=TILES), FaCE)
+    assert isinstance(solve(BALL.points, FIELD, execution=TILES), Tiled)
+    assert isinstance(solve(BALL.points, execution=LITTLE), Tiled)
 
 
 def test_what_needs_one_piece_is_refused_where_it_does_not_fit(tmp_path):
@@ -31,10 +32,10 @@ def test_what_needs_one_piece_is_refused_where_it_does_not_fit(tmp_path):
     SculptFile(charges=((0.0, 0.0, 0.0),)).save(file)
     refusal = r"points must be few enough for one piece, which .+ needs: 1500 take about 0.35 GB, found 0.34 GB"
     for call in (
-        lambda: solve_whole(BALL.points, LITTLE, purpose="a slice of the field"),
-        lambda: estimate_normals(BALL.points, LITTLE, sculpt=file),
-        lambda: Session(BALL.points, LITTLE),
-        lambda: sculpted(PointSet(BALL.points), file, LITTLE),
+        lambda: solve_whole(BALL.points, execution=LITTLE, purpose="a slice of the field"),
+        lambda: estimate_normals(BALL.points, execution=LITTLE, sculpt=file),
+        lambda: Session(BALL.points, execution=LITTLE),
+        lambda: sculpted(PointSet(BALL.points), file, execution=LITTLE),
     ):
         with pytest.raises(ValueError, match=refusal):
             call()
@@ -42,7 +43,7 @@ def test_what_needs_one_piece_is_refused_where_it_does_not_fit(tmp_path):
 
 def test_tiles_classify_when_asked_later():
     nested = shapes.nested_box(2000, 0)
-    tiled = Tiled(nested.points, TILES)
+    tiled = Tiled(nested.points, FIELD, execution=TILES)
     assert tiled.result().interior is None
     found = tiled.result(filter_interior=True).interior
     assert found is not None
@@ -54,11 +55,11 @@ def test_a_mesh_that_fails_is_tried_with_another_seed(monkeypatch, caplog):
     seeds = []
     build = solving.build_mesh
 
-    def fails_once(balls, spacing, box, params):
+    def fails_once(balls, spacing, box, params, memory):
         seeds.append(params.seed)
         if len(seeds) == 1:
             raise MeshingError("no tetrahedra")
-        return build(balls, spacing, box, params)
+        return build(balls, spacing, box, params, memory)
 
     monkeypatch.setattr(solving, "build_mesh", fails_once)
     with caplog.at_level(logging.WARNING):

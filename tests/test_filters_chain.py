@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from face_plugin import Params
+from face_plugin import Execution, Params
 from face_plugin.errors import MeshingError
 from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
 from face_plugin.filters.base import Filter
@@ -14,7 +14,7 @@ CHAIN = Chain(
     [
         Thin(0.125, seed=3),
         Sculpt("/edits/a b.json", Params(cage_spacing=0.0)),
-        Normals(Params(cage_spacing=0.01, solid="icosahedron", alpha="dense")),
+        Normals(Params(cage_spacing=0.01, solid="icosahedron", alpha="dense"), execution=Execution(workers=3)),
         Interior("sparse"),
         Surface(depth=9, screened=False, backend="pymeshlab"),
     ]
@@ -35,6 +35,14 @@ def test_a_chain_written_by_hand(tmp_path):
         encoding="utf-8",
     )
     assert Chain.load(path) == Chain([Thin(1), Normals(Params(seed=4))])
+
+
+def test_settings_of_method_and_execution_stand_beside_those_of_the_step():
+    options = {"alpha": 0.2, "grading": 1.5, "tile_points": 2000, "engine": "serial"}
+    step = Interior.from_dict(options)
+    assert step == Interior(0.2, Params(grading=1.5), Execution(tile_points=2000, engine="serial"))
+    assert step.to_dict() == {"filter": "interior", **options}
+    assert Normals.from_dict({}) == Normals(None, execution=None)
 
 
 def test_a_sculpt_lies_beside_its_chain(tmp_path):

@@ -1,12 +1,10 @@
 """The steps: each does what the array call does, on the points that are kept."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin import Params, estimate_normals, reconstruct
+from face_plugin import Execution, Params, estimate_normals, reconstruct
 from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
 from face_plugin.sculpt import SculptFile
 from face_plugin.shapes import nested_box, spherical_shell, torus
@@ -86,22 +84,22 @@ def test_thinning_nothing_is_nothing():
 
 def test_a_large_cloud_is_solved_in_tiles_and_classified_in_the_same_pass():
     shape = nested_box(2500)
-    params = Params(tile_points=1500, engine="serial")
-    expected = estimate_normals(shape.points, params, filter_interior=True)
+    tiles = Execution(tile_points=1500, engine="serial")
+    expected = estimate_normals(shape.points, filter_interior=True, execution=tiles)
     stages = []
-    layer = Chain([Normals(params), Interior()])(
+    layer = Chain([Normals(execution=tiles), Interior()])(
         PointSet(shape.points), progress=lambda stage, fraction: stages.append((stage, fraction))
     )
     assert np.array_equal(layer.normals, expected.normals)
     assert np.array_equal(layer.attributes["interior"], expected.interior)
     assert stages.count(("coarse", 1.0)) == 1
-    alone = Interior(params=params)(PointSet(shape.points))
+    alone = Interior(execution=tiles)(PointSet(shape.points))
     assert np.array_equal(alone.keep, layer.keep)
     # Another alpha takes another pass in tiles, with the same result as from the start.
-    other = Interior(0.3)(Normals(params)(PointSet(shape.points)))
-    direct = dataclasses.replace(params, alpha=0.3)
+    other = Interior(0.3)(Normals(execution=tiles)(PointSet(shape.points)))
     assert np.array_equal(
-        other.attributes["interior"], estimate_normals(shape.points, direct, filter_interior=True).interior
+        other.attributes["interior"],
+        estimate_normals(shape.points, Params(alpha=0.3), filter_interior=True, execution=tiles).interior,
     )
 
 
@@ -109,9 +107,9 @@ def test_a_sculpted_cloud_is_solved_in_one_piece_whatever_its_size(tmp_path):
     ring = torus(1600)
     path = tmp_path / "edits.json"
     SculptFile(charges=((0.0, 0.0, 0.0),)).save(path)
-    params = Params(tile_points=1000, engine="serial")
-    layer = Chain([Sculpt(str(path), params), Normals()])(PointSet(ring.points))
-    assert np.array_equal(layer.normals, estimate_normals(ring.points, params, sculpt=path).normals)
+    tiles = Execution(tile_points=1000, engine="serial")
+    layer = Chain([Sculpt(str(path), execution=tiles), Normals()])(PointSet(ring.points))
+    assert np.array_equal(layer.normals, estimate_normals(ring.points, sculpt=path, execution=tiles).normals)
 
 
 @pytest.mark.parametrize("distance", [0.0, -1.0, np.inf, np.nan, True, "1"])

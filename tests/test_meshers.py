@@ -236,14 +236,14 @@ def test_gate_refuses_meshes_that_are_wrong():
 def test_memory_is_bounded(mesher):
     balls, spacing, box = caged(BALL.points)
     with pytest.raises(MeshingError, match=r"GB, more than the allowed 0.001; try .*max_memory"):
-        build_mesh(balls, spacing, box, Params(mesher=mesher, max_memory=1e-3))
+        build_mesh(balls, spacing, box, Params(mesher=mesher), memory=1e6)
 
 
 def test_memory_of_free_vertices_is_bounded():
     """The finest cells of this octree would be a billion."""
     balls, spacing, box = caged(BALL.points)
     with pytest.raises(MeshingError, match=r"more than .* free vertices, .*try a larger Params.finest"):
-        build_mesh(balls, spacing, box, Params(mesher="delaunay", finest=0.01, grading=0.01, max_memory=0.1))
+        build_mesh(balls, spacing, box, Params(mesher="delaunay", finest=0.01, grading=0.01), memory=0.1e9)
 
 
 def test_auto_goes_on_to_the_next_mesher_and_says_so(monkeypatch, caplog):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from face_plugin import Params, orient_normals
+from face_plugin import Execution, orient_normals
 from face_plugin.shapes import box, sphere
 
 
@@ -63,10 +63,10 @@ def test_coinciding_points_and_strays_are_turned_as_well():
 
 
 def test_a_cloud_in_tiles_and_what_it_cannot_do():
-    ball, params = sphere(2500), Params(tile_points=1500, engine="serial")
-    assert np.array_equal(orient_normals(ball.points, mixed(ball.normals), params), ball.normals)
+    ball, tiles = sphere(2500), Execution(tile_points=1500, engine="serial")
+    assert np.array_equal(orient_normals(ball.points, mixed(ball.normals), execution=tiles), ball.normals)
     with pytest.raises(ValueError, match="trusted needs the cloud in one piece"):
-        orient_normals(ball.points, ball.normals, params, trusted=np.ones(2500, dtype=bool))
+        orient_normals(ball.points, ball.normals, execution=tiles, trusted=np.ones(2500, dtype=bool))
 
 
 def spoilt(value):

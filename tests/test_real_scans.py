@@ -151,6 +151,6 @@ def test_confidence_is_in_the_side_that_sensors_saw():
     assert np.median(result.confidence[good]) > 0.5
     # In tiles as well, which find it out by themselves.
     tiled = estimate_normals(
-        room.points, face_plugin.Params(tile_points=1000, engine="serial"), viewpoints=room.viewpoints
+        room.points, execution=face_plugin.Execution(tile_points=1000, engine="serial"), viewpoints=room.viewpoints
     )
     assert np.median(tiled.confidence[good]) > 0.5

@@ -1,5 +1,6 @@
 """Tiles from end to end: the same answers as in one piece, whoever solves them and in whatever order."""
 
+import dataclasses
 import itertools
 import os
 import signal
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin import FaCE, Params, estimate_normals
+from face_plugin import Execution, FaCE, Params, estimate_normals
 from face_plugin.io.sources import ArraySource
 from face_plugin.shapes import demo_shape, sphere
 from face_plugin.tiles import estimate_tiled, in_tiles
@@ -24,7 +25,7 @@ from face_plugin.tiles.scene import write_far
 from face_plugin.tiles.surroundings import surroundings
 from face_plugin.tiles.tile import HALO, orient_tile, solve_tile
 
-PARAMS = Params(tile_points=1000, engine="serial")
+EXECUTION = Execution(tile_points=1000, engine="serial")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def shape():
 
 @pytest.fixture(scope="module")
 def serial(shape):
-    return estimate_tiled(shape.points, PARAMS, filter_interior=True)
+    return estimate_tiled(shape.points, execution=EXECUTION, filter_interior=True)
 
 
 def same(a, b):
@@ -61,7 +62,7 @@ def test_normals_of_one_piece(shape, serial):
 def test_there_is_no_seam(shape, serial, tmp_path):
     """Where tiles meet, the normals are those of one piece as often as elsewhere."""
     one = estimate_normals(shape.points, Params())
-    store, _ = fill_store(tmp_path, ArraySource(shape.points), PARAMS, 1000, interior=True)
+    store, _ = fill_store(tmp_path, ArraySource(shape.points), Params(), 1000, interior=True)
     tile = np.empty(store.count, dtype=np.int64)
     tile[store.rows()] = np.repeat(np.arange(store.tiles), np.diff(store.start))
     distance, near = cKDTree(shape.points).query(shape.points, k=20)
@@ -103,8 +104,8 @@ def test_interior_of_a_solid_larger_than_a_tile(tmp_path):
 
 @pytest.mark.parametrize("alpha", ["auto", "dense", 0.05])
 def test_interior_as_in_one_piece(shape, alpha):
-    params = Params(tile_points=2000, engine="serial", alpha=alpha)
-    tiled = estimate_tiled(shape.points, params, filter_interior=True).interior
+    tiles = Execution(tile_points=2000, engine="serial")
+    tiled = estimate_tiled(shape.points, Params(alpha=alpha), filter_interior=True, execution=tiles).interior
     one = FaCE(shape.points, Params(alpha=alpha)).interior()
     # Measured: 99.5 % for every alpha; what differs lies at the seams of the parts.
     assert (tiled == one).mean() > 0.985
@@ -114,12 +115,12 @@ def test_interior_as_in_one_piece(shape, alpha):
 def test_a_flat_cloud_has_one_normal():
     rng = np.random.default_rng(0)
     points = np.c_[rng.random((2500, 2)), np.zeros(2500)]
-    tiled = estimate_tiled(points, Params(tile_points=1250, engine="serial"))
+    tiled = estimate_tiled(points, execution=Execution(tile_points=1250, engine="serial"))
     assert np.array_equal(tiled.normals, FaCE(points).normals())
 
 
 def test_plain_gradients(shape):
-    tiled = estimate_tiled(shape.points, Params(tile_points=2000, engine="serial", angles="field"))
+    tiled = estimate_tiled(shape.points, Params(angles="field"), execution=Execution(tile_points=2000, engine="serial"))
     one = estimate_normals(shape.points, Params(angles="field"))
     assert same(tiled.normals, one.normals)[~shape.interior].mean() > 0.998
 
@@ -141,7 +142,7 @@ class Killing(Processes):
 
 def test_a_killed_process_changes_nothing(shape, serial):
     engine = Killing(2)
-    result = estimate_tiled(shape.points, PARAMS, filter_interior=True, engine=engine)
+    result = estimate_tiled(shape.points, filter_interior=True, execution=dataclasses.replace(EXECUTION, engine=engine))
     assert engine.killed
     assert equal(result, serial)
 
@@ -152,10 +153,10 @@ def test_a_script_needs_no_main_guard(tmp_path):
         textwrap.dedent(
             """
             print("started")
-            from face_plugin import Params, estimate_normals
+            from face_plugin import Execution, estimate_normals
             from face_plugin.shapes import sphere
             ball = sphere(2500)
-            result = estimate_normals(ball.points, Params(tile_points=1250, engine="processes", workers=2))
+            result = estimate_normals(ball.points, execution=Execution(tile_points=1250, engine="processes", workers=2))
             print(((result.normals * ball.normals).sum(axis=1) > 0).mean())
             """
         )
@@ -177,19 +178,24 @@ def test_dask_with_a_worker_killed(shape, serial):
                 killed.append(fraction)
                 os.kill(pids[0], signal.SIGKILL)
 
-        result = estimate_tiled(shape.points, PARAMS, filter_interior=True, engine=client, progress=kill)
+        result = estimate_tiled(
+            shape.points,
+            filter_interior=True,
+            execution=dataclasses.replace(EXECUTION, engine=client),
+            progress=kill,
+        )
         assert killed
         assert killed[0] < 1
         assert equal(result, serial)
         # The address of a scheduler will do as well, in the settings: that is how a host passes it.
         small = sphere(2500).points
-        by_address = estimate_normals(small, Params(tile_points=1250, engine=cluster.scheduler_address))
-        assert equal(by_address, estimate_normals(small, Params(tile_points=1250, engine="serial")))
+        by_address = estimate_normals(small, execution=Execution(tile_points=1250, engine=cluster.scheduler_address))
+        assert equal(by_address, estimate_normals(small, execution=Execution(tile_points=1250, engine="serial")))
 
 
 def test_the_order_of_the_points_does_not_matter(shape, serial):
     order = np.random.default_rng(0).permutation(len(shape.points))
-    result = estimate_tiled(shape.points[order], PARAMS, filter_interior=True)
+    result = estimate_tiled(shape.points[order], execution=EXECUTION, filter_interior=True)
     for kind in ("normals", "strength", "confidence"):
         assert np.allclose(getattr(result, kind), getattr(serial, kind)[order], rtol=0, atol=1e-6)
     assert np.array_equal(result.interior, serial.interior[order])
@@ -198,18 +204,20 @@ def test_the_order_of_the_points_does_not_matter(shape, serial):
 def test_input_types_and_repeated_points():
     ball = sphere(2000)
     points = ball.points[np.r_[0:2000, 0:500]].astype(np.float32)
-    result = estimate_tiled(points, Params(tile_points=1250, engine="serial"))
+    result = estimate_tiled(points, execution=Execution(tile_points=1250, engine="serial"))
     assert result.normals.dtype == np.float32
     assert np.array_equal(result.normals[:500], result.normals[2000:])
     assert same(result.normals[:2000], ball.normals).all()
     whole = np.rint(ball.points * 1000).astype(int)
-    assert same(estimate_tiled(whole, Params(tile_points=1000, engine="serial")).normals, ball.normals).all()
+    assert same(
+        estimate_tiled(whole, execution=Execution(tile_points=1000, engine="serial")).normals, ball.normals
+    ).all()
 
 
 def test_a_tile_of_copies_of_one_stray_point():
     ball = sphere(1200)
     points = np.r_[ball.points, np.full((1100, 3), 4.0)]
-    result = estimate_tiled(points, Params(tile_points=1000, engine="serial"))
+    result = estimate_tiled(points, execution=Execution(tile_points=1000, engine="serial"))
     assert same(result.normals[:1200], ball.normals).mean() > 0.99
     assert np.isfinite(result.normals).all()
     assert np.allclose(np.linalg.norm(result.normals, axis=1), 1.0)
@@ -222,29 +230,29 @@ def test_a_dense_patch_beside_a_sparse_rest():
     dense = rng.normal(scale=0.1, size=(4000, 3))
     dense[:, 2] = np.sqrt(1 - dense[:, 0] ** 2 - dense[:, 1] ** 2)
     points = np.concatenate([ball.points, dense])
-    result = estimate_tiled(points, Params(tile_points=1500, engine="serial"))
+    result = estimate_tiled(points, execution=Execution(tile_points=1500, engine="serial"))
     # Uniform random points leave pairs that nearly touch; in one piece 99.9 % are right as well.
     assert same(result.normals, points).mean() > 0.995
 
 
 def test_bad_input_is_judged_as_in_one_piece():
     with pytest.raises(ValueError, match=r"points must have the shape \(n, 3\)"):
-        estimate_tiled(np.zeros((5, 2)), PARAMS)
+        estimate_tiled(np.zeros((5, 2)), execution=EXECUTION)
     bad = sphere(3000).points
     bad[7] = np.nan
     with pytest.raises(ValueError, match=r"found NaN or infinity in 1 of 3000 rows: 7"):
-        estimate_tiled(bad, PARAMS)
+        estimate_tiled(bad, execution=EXECUTION)
     line = np.arange(3000.0)[:, None] * np.array([[1.0, 2.0, 3.0]])
     with pytest.raises(ValueError, match="must not all lie on one line"):
-        estimate_tiled(line, PARAMS)
+        estimate_tiled(line, execution=EXECUTION)
 
 
 def test_which_clouds_are_tiled():
-    assert not in_tiles(1000, Params(tile_points=1000))
-    assert in_tiles(1001, Params(tile_points=1000))
-    assert in_tiles(10_000_000, Params())
-    assert in_tiles(40_000, Params(max_memory=0.5))
-    assert not in_tiles(40_000, Params(max_memory=8.0))
+    assert not in_tiles(1000, Execution(tile_points=1000))
+    assert in_tiles(1001, Execution(tile_points=1000))
+    assert in_tiles(10_000_000, Execution())
+    assert in_tiles(40_000, Execution(max_memory=0.5))
+    assert not in_tiles(40_000, Execution(max_memory=8.0))
 
 
 @pytest.mark.parametrize(
@@ -259,17 +267,17 @@ def test_which_clouds_are_tiled():
 )
 def test_settings_out_of_range(changes, message):
     with pytest.raises(ValueError, match=message):
-        Params(**changes)
+        Execution(**changes)
 
 
 def test_less_memory_than_a_tile_needs():
     with pytest.raises(ValueError, match=r"max_memory must be at least 0\.\d+ GB, found 0\.10"):
-        estimate_tiled(sphere(3000).points, Params(tile_points=1000, max_memory=0.1))
+        estimate_tiled(sphere(3000).points, execution=Execution(tile_points=1000, max_memory=0.1))
 
 
 def test_progress_counts_the_tiles():
     seen = []
-    estimate_tiled(sphere(3000).points, PARAMS, progress=lambda stage, done: seen.append((stage, done)))
+    estimate_tiled(sphere(3000).points, execution=EXECUTION, progress=lambda stage, done: seen.append((stage, done)))
     tiles = [done for stage, done in seen if stage == "tiles"]
     assert tiles == sorted(tiles)
     assert len(set(tiles)) == 4
@@ -280,7 +288,7 @@ def test_progress_counts_the_tiles():
 
 def test_a_tile_done_is_not_solved_again(tmp_path, monkeypatch):
     source = ArraySource(sphere(2500).points)
-    store, _ = solve_store(tmp_path, source, Params(tile_points=1250), engine="serial")
+    store, _ = solve_store(tmp_path, source, Params(), execution=Execution(tile_points=1250, engine="serial"))
     before = store.path(0, "field").stat().st_mtime_ns
     assert solve_tile(str(tmp_path), 0) == 0
     assert store.path(0, "field").stat().st_mtime_ns == before

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 
-from face_plugin import Params, estimate_normals
+from face_plugin import Execution, estimate_normals
 from face_plugin.io import CloudFile, read_cloud, write_cloud
 from face_plugin.shapes import sphere
 from face_plugin.tiles.files import work_folder
@@ -23,8 +23,12 @@ def test_tiles_by_options(tmp_path):
     write_cloud(tmp_path / "in.ply", CloudFile(ball.points))
     command = [*FACE, "normals", "in.ply", "-o", "out.ply", *TILES, "--engine", "processes", "--json"]
     out = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-    assert json.loads(out)["timings"]["tiles"] > 0
-    expected = estimate_normals(ball.points, Params(tile_points=1000, engine="serial"))
+    said = json.loads(out)
+    assert said["timings"]["tiles"] > 0
+    asked = {"tile_points": 1000, "max_memory": None, "engine": "processes", "workers": 2}
+    assert said["execution"] == asked
+    assert not said["params"].keys() & asked.keys()
+    expected = estimate_normals(ball.points, execution=Execution(tile_points=1000, engine="serial"))
     assert np.array_equal(read_cloud(tmp_path / "out.ply").normals, expected.normals)
 
 
@@ -45,5 +49,5 @@ def test_a_killed_run_is_resumed(tmp_path):
     again = subprocess.run([*command, "-v"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert f"{len(done)} of 6 tiles are done already" in again.stderr
     assert not folder.exists()
-    expected = estimate_normals(ball.points, Params(tile_points=1000, engine="serial"))
+    expected = estimate_normals(ball.points, execution=Execution(tile_points=1000, engine="serial"))
     assert np.array_equal(np.load(tmp_path / "out.npy")[:, 3:], expected.normals)

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from face_plugin import FaceError, Params
+from face_plugin import Execution, FaceError
 from face_plugin.faraday.meshers.delaunay import tetrahedralize
 from face_plugin.shapes import sphere
 from face_plugin.tiles import estimate_tiled
@@ -90,15 +90,16 @@ def test_this_process_takes_part(tmp_path):
 
 
 def test_it_takes_part_where_there_is_a_tile_for_each():
-    params = Params(workers=2, max_memory=8.0)
-    assert make_engine("processes", params, 1000, 2000).takes_part
-    assert not make_engine("processes", params, 1000, 2001).takes_part
+    execution = Execution(engine="processes", workers=2, max_memory=8.0)
+    assert make_engine(execution, 1000, 2000).takes_part
+    assert not make_engine(execution, 1000, 2001).takes_part
     assert not Processes(1, takes_part=True).takes_part
 
 
 def test_two_tiles_are_the_same_here_and_there():
     ball = sphere(2000).points
-    one, two = (estimate_tiled(ball, Params(tile_points=1000, engine=e, workers=2)) for e in ("serial", "processes"))
+    kinds = [Execution(tile_points=1000, engine=engine, workers=2) for engine in ("serial", "processes")]
+    one, two = (estimate_tiled(ball, execution=execution) for execution in kinds)
     assert np.array_equal(one.normals, two.normals)
     assert np.array_equal(one.confidence, two.confidence)
 
@@ -109,14 +110,14 @@ def test_a_process_is_copied_only_where_it_has_no_threads_of_others():
         "import sys, threading, warnings\n"
         "warnings.simplefilter('error')\n"
         "import numpy as np\n"
-        "from face_plugin import Params\n"
+        "from face_plugin import Execution\n"
         "from face_plugin.shapes import sphere\n"
         "from face_plugin.tiles import engines, estimate_tiled\n"
         "ball = sphere(2000).points\n"
-        "one = estimate_tiled(ball, Params(tile_points=1000, engine='serial'))\n"
+        "one = estimate_tiled(ball, execution=Execution(tile_points=1000, engine='serial'))\n"
         "for forks in (sys.platform == 'linux', False):\n"
         "    assert engines._may_fork() == forks\n"
-        "    two = estimate_tiled(ball, Params(tile_points=1000, engine='processes', workers=2))\n"
+        "    two = estimate_tiled(ball, execution=Execution(tile_points=1000, engine='processes', workers=2))\n"
         "    assert np.array_equal(one.normals, two.normals)\n"
         "    assert np.array_equal(one.confidence, two.confidence)\n"
         "    threading.Thread(target=threading.Event().wait, daemon=True).start()\n"
@@ -125,18 +126,18 @@ def test_a_process_is_copied_only_where_it_has_no_threads_of_others():
 
 
 def test_engines_by_name():
-    assert isinstance(make_engine("serial", Params(), 1000, 5000), Serial)
-    assert isinstance(make_engine(None, Params(engine="processes", workers=3), 1000, 5000), Processes)
-    assert make_engine("processes", Params(workers=8, max_memory=16.0), 1000, 3000).workers == 3
+    assert isinstance(make_engine(Execution(engine="serial"), 1000, 5000), Serial)
+    assert isinstance(make_engine(Execution(engine="processes", workers=3), 1000, 5000), Processes)
+    assert make_engine(Execution(engine="processes", workers=8, max_memory=16.0), 1000, 3000).workers == 3
     # 0.6 GB hold this process and one more.
-    assert make_engine("processes", Params(workers=8, max_memory=0.6), 1000, 9000).workers == 1
-    assert isinstance(make_engine("auto", Params(workers=1), 1000, 9000), Serial)
+    assert make_engine(Execution(engine="processes", workers=8, max_memory=0.6), 1000, 9000).workers == 1
+    assert isinstance(make_engine(Execution(workers=1), 1000, 9000), Serial)
     own = Serial()
-    assert make_engine(own, Params(), 1000, 5000) is own
+    assert make_engine(Execution(engine=own), 1000, 5000) is own
     with pytest.raises(ValueError, match="engine must be"):
-        make_engine("threads", Params(), 1000, 5000)
+        Execution(engine="threads")
     with pytest.raises(ValueError, match="engine must be"):
-        make_engine(3, Params(), 1000, 5000)
+        Execution(engine=3)
 
 
 def test_warming_up_takes_a_cloud_through_both_stages():

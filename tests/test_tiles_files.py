@@ -1,9 +1,11 @@
 """Files larger than memory: read and written in parts, resumed after an interruption."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from face_plugin import Params, estimate_normals
+from face_plugin import Execution, Params, estimate_normals
 from face_plugin.io import CloudFile, read_cloud, write_cloud
 from face_plugin.io.sinks import WRITERS
 from face_plugin.io.sources import ArraySource, open_source
@@ -12,7 +14,7 @@ from face_plugin.tiles.engines import Serial
 from face_plugin.tiles.files import columns_of, normals_of_file, streams, work_folder
 from face_plugin.tiles.prepare import fill_store
 
-PARAMS = Params(tile_points=1250, engine="serial")
+EXECUTION = Execution(tile_points=1250, engine="serial")
 COUNT = 2500
 
 
@@ -23,7 +25,7 @@ def ball():
 
 @pytest.fixture(scope="module")
 def expected(ball):
-    return estimate_normals(ball.points, PARAMS)
+    return estimate_normals(ball.points, execution=EXECUTION)
 
 
 def attributes():
@@ -85,7 +87,7 @@ def test_colours_of_las_become_bytes_in_every_part(factor, ball, tmp_path):
 
 def test_the_same_normals_as_in_memory(ball, expected, tmp_path):
     np.save(tmp_path / "in.npy", ball.points)
-    result = normals_of_file(tmp_path / "in.npy", tmp_path / "out.ply", PARAMS)
+    result = normals_of_file(tmp_path / "in.npy", tmp_path / "out.ply", execution=EXECUTION)
     assert np.array_equal(read_cloud(tmp_path / "out.ply").normals, expected.normals)
     assert result.written == COUNT
     assert not work_folder(tmp_path / "out.ply").exists()
@@ -104,7 +106,7 @@ def test_an_interrupted_run_goes_on(ball, expected, tmp_path):
     source, output = tmp_path / "in.npy", tmp_path / "out.npy"
     np.save(source, ball.points)
     with pytest.raises(KeyboardInterrupt):
-        normals_of_file(source, output, PARAMS, engine=Stopping())
+        normals_of_file(source, output, execution=dataclasses.replace(EXECUTION, engine=Stopping()))
     assert not output.exists()
     folder = work_folder(output)
     done = list(folder.glob("field-*.npz"))
@@ -117,8 +119,8 @@ def test_an_interrupted_run_goes_on(ball, expected, tmp_path):
             super().run(job, folder, tiles, done)
 
     # How the work is done may change on the way.
-    other = Params(tile_points=1250, workers=3, max_memory=2.0)
-    normals_of_file(source, output, other, engine=Watching(), resume=True)
+    other = Execution(tile_points=1250, workers=3, max_memory=2.0)
+    normals_of_file(source, output, execution=dataclasses.replace(other, engine=Watching()), resume=True)
     # One tile of the first stage was left, and the second.
     assert solved == [1, 2]
     assert np.array_equal(np.load(output)[:, 3:], expected.normals)
@@ -128,12 +130,12 @@ def test_work_on_another_cloud_is_not_resumed(ball, tmp_path):
     source, output = tmp_path / "in.npy", tmp_path / "out.npy"
     np.save(source, ball.points)
     with pytest.raises(KeyboardInterrupt):
-        normals_of_file(source, output, PARAMS, engine=Stopping())
+        normals_of_file(source, output, execution=dataclasses.replace(EXECUTION, engine=Stopping()))
     with pytest.raises(ValueError, match="another input or with other settings"):
-        normals_of_file(source, output, Params(tile_points=1250, seed=1), engine="serial", resume=True)
+        normals_of_file(source, output, Params(seed=1), execution=EXECUTION, resume=True)
     np.save(source, ball.points[::-1])
     with pytest.raises(ValueError, match="another input or with other settings"):
-        normals_of_file(source, output, PARAMS, resume=True)
+        normals_of_file(source, output, execution=EXECUTION, resume=True)
     assert work_folder(output).exists()
 
 
@@ -142,10 +144,10 @@ def test_a_failure_before_any_tile_leaves_nothing(tmp_path):
     bad[2100, 1] = np.inf
     np.save(tmp_path / "in.npy", bad)
     with pytest.raises(ValueError, match="found NaN or infinity in 1 of 2500 rows: 2100"):
-        normals_of_file(tmp_path / "in.npy", tmp_path / "out.ply", PARAMS)
+        normals_of_file(tmp_path / "in.npy", tmp_path / "out.ply", execution=EXECUTION)
     assert [path.name for path in tmp_path.iterdir()] == ["in.npy"]
     with pytest.raises(ValueError, match=r"1 of 500 rows: 100 \(rows counted from row 2000\)"):
-        fill_store(tmp_path, ArraySource(bad), PARAMS, 1250, interior=False, chunk=1000)
+        fill_store(tmp_path, ArraySource(bad), Params(), 1250, interior=False, chunk=1000)
 
 
 def test_a_store_does_not_depend_on_the_parts(ball, tmp_path):
@@ -153,7 +155,7 @@ def test_a_store_does_not_depend_on_the_parts(ball, tmp_path):
     for name, chunk in (("whole", COUNT), ("parts", 700)):
         (tmp_path / name).mkdir()
         source = ArraySource(ball.points)
-        stores.append(fill_store(tmp_path / name, source, PARAMS, 600, interior=False, chunk=chunk))
+        stores.append(fill_store(tmp_path / name, source, Params(), 600, interior=False, chunk=chunk))
     (whole, voxels), (parts, others) = stores
     assert np.array_equal(whole.points(), parts.points())
     assert np.array_equal(whole.rows(), parts.rows())
@@ -179,7 +181,7 @@ def test_files_that_cannot_be_streamed(tmp_path):
 
 def test_what_is_streamed(tmp_path):
     np.save(tmp_path / "in.npy", np.zeros((200_000, 3), dtype=np.float32))
-    small, large = Params(max_memory=0.05), Params(max_memory=1.0)
+    small, large = Execution(max_memory=0.05), Execution(max_memory=1.0)
     assert streams(tmp_path / "in.npy", tmp_path / "out.ply", small)
     assert not streams(tmp_path / "in.npy", tmp_path / "out.ply", large)
     assert not streams(tmp_path / "in.npy", tmp_path / "out.xyz", small)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from face_plugin.errors import require
 from face_plugin.filters import PointSet
 from face_plugin.filters.sculpt import sculpted
-from face_plugin.params import Params
-from face_plugin.sides.sensors import sensors_of
+from face_plugin.sides.sensors import Sensors
 
 __all__ = ["is_empty", "is_tensor", "layer_of", "normals_of", "points_of", "select", "set_normals"]
 
@@ -77,15 +77,10 @@ def is_empty(pcd: Any) -> bool:
 
 
 def layer_of(
-    pcd: Any,
-    sculpt: str | os.PathLike[str] | None,
-    params: Params | None,
-    viewpoints: ArrayLike | None,
-    seen_from: ArrayLike | None,
-    up: ArrayLike | None,
+    pcd: Any, sculpt: str | os.PathLike[str] | None, sensors: Sensors | None, settings: Mapping[str, Any]
 ) -> PointSet:
     """Points of the cloud for a chain of steps, with the sensors and the edits of a sculpt file."""
-    return sculpted(PointSet(points_of(pcd), sensors=sensors_of(viewpoints, seen_from, up)), sculpt, params)
+    return sculpted(PointSet(points_of(pcd), sensors=sensors), sculpt, **settings)
 
 
 def set_normals(pcd: Any, normals: NDArray[Any] | None) -> None:

@@ -16,29 +16,33 @@ from face_plugin.adapters.open3d import orient
 from face_plugin.adapters.open3d.cloud import normals_of, points_of
 from face_plugin.adapters.open3d.points import estimate_normals
 from face_plugin.errors import require
-from face_plugin.params import Params, checked
+from face_plugin.execution import Execution
+from face_plugin.params import Params, settled
 
 __all__ = ["install", "installed", "uninstall"]
 
 log = logging.getLogger(__name__)
 
 _originals: dict[tuple[type, str], Any] = {}
-_params: Params | None = None
+# What every call is given: `params` and `execution`.
+_settings: dict[str, Any] = {}
 # Clouds whose normals point outward already, and what their points and normals were then.
 _outward: weakref.WeakKeyDictionary[Any, bytes] = weakref.WeakKeyDictionary()
 
 
-def install(params: Params | None = None) -> None:
+def install(params: Params | None = None, execution: Execution | None = None) -> None:
     """Make Open3D's methods for normals call FaCE, of both its APIs, until `uninstall`.
 
     These are ``estimate_normals``, ``orient_normals_consistent_tangent_plane``,
     ``orient_normals_towards_camera_location`` and ``orient_normals_to_align_with_direction``. The second does nothing
-    to normals that FaCE has just estimated, since they are consistent. Installing again only changes `params`.
+    to normals that FaCE has just estimated, since they are consistent. Installing again only changes the settings.
 
     Parameters
     ----------
     params : Params, optional
         Used by every call.
+    execution : Execution, optional
+        Likewise.
 
     Examples
     --------
@@ -50,8 +54,7 @@ def install(params: Params | None = None) -> None:
     >>> pcd.orient_normals_consistent_tangent_plane(15)
     >>> uninstall()
     """
-    global _params
-    _params = None if params is None else checked(params)
+    _settings.update(zip(("params", "execution"), settled(params, execution), strict=True))
     if _originals:
         return
     o3d = require("open3d", extra="open3d")
@@ -69,16 +72,15 @@ def install(params: Params | None = None) -> None:
 
 def uninstall() -> None:
     """Put Open3D's own methods back; nothing happens where they are in place."""
-    global _params
     for (cloud, name), original in _originals.items():
         setattr(cloud, name, original)
     _originals.clear()
     _outward.clear()
-    _params = None
+    _settings.clear()
 
 
 @contextmanager
-def installed(params: Params | None = None) -> Iterator[None]:
+def installed(params: Params | None = None, execution: Execution | None = None) -> Iterator[None]:
     """`install` within a ``with`` block; afterwards all is as it was before, installed or not.
 
     Examples
@@ -89,19 +91,19 @@ def installed(params: Params | None = None) -> Iterator[None]:
     >>> with installed():
     ...     pcd.estimate_normals()
     """
-    before, was_installed = _params, bool(_originals)
-    install(params)
+    before, was_installed = dict(_settings), bool(_originals)
+    install(params, execution)
     try:
         yield
     finally:
         if was_installed:
-            install(before)
+            install(**before)
         else:
             uninstall()
 
 
 def _estimate(pcd: Any, **arguments: Any) -> None:
-    estimate_normals(pcd, **arguments, params=_params)
+    estimate_normals(pcd, **arguments, **_settings)
     if len(points_of(pcd)):
         _outward[pcd] = _digest(pcd)
 
@@ -118,15 +120,15 @@ def _consistent(self: Any, k: int, lambda_penalty: float = 0.0, cos_alpha_tol: f
     if self in _outward and _outward[self] == _digest(self):
         log.debug("orient_normals_consistent_tangent_plane(%s) skipped: FaCE's normals are consistent", k)
     else:
-        orient.orient_normals_consistent_tangent_plane(self, k, lambda_penalty, cos_alpha_tol, params=_params)
+        orient.orient_normals_consistent_tangent_plane(self, k, lambda_penalty, cos_alpha_tol, **_settings)
 
 
 def _towards(self: Any, camera_location: Any = (0.0, 0.0, 0.0)) -> None:
-    orient.orient_normals_towards_camera_location(self, camera_location, params=_params)
+    orient.orient_normals_towards_camera_location(self, camera_location, **_settings)
 
 
 def _align(self: Any, orientation_reference: Any = (0.0, 0.0, 1.0)) -> None:
-    orient.orient_normals_to_align_with_direction(self, orientation_reference, params=_params)
+    orient.orient_normals_to_align_with_direction(self, orientation_reference, **_settings)
 
 
 def _digest(pcd: Any) -> bytes:

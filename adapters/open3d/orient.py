@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from face_plugin import estimate
 from face_plugin.adapters.open3d.cloud import is_empty, normals_of, points_of, set_normals
+from face_plugin.execution import Execution
 from face_plugin.params import Params
 
 __all__ = [
@@ -28,6 +29,7 @@ def orient_normals_consistent_tangent_plane(
     cos_alpha_tol: float = 1.0,
     *,
     params: Params | None = None,
+    execution: Execution | None = None,
 ) -> None:
     """Turn the cloud's normals outward, in place; their lines stay as they are.
 
@@ -38,6 +40,7 @@ def orient_normals_consistent_tangent_plane(
     k, lambda_penalty, cos_alpha_tol
         Those of Open3D's method; FaCE has no use for them and logs that.
     params : Params, optional
+    execution : Execution, optional
 
     Raises
     ------
@@ -60,11 +63,15 @@ def orient_normals_consistent_tangent_plane(
     True
     """
     log.debug("FaCE has no use for k, lambda_penalty and cos_alpha_tol")
-    _orient(pcd, params)
+    _orient(pcd, params, execution)
 
 
 def orient_normals_towards_camera_location(
-    pcd: Any, camera_location: Any = (0.0, 0.0, 0.0), *, params: Params | None = None
+    pcd: Any,
+    camera_location: Any = (0.0, 0.0, 0.0),
+    *,
+    params: Params | None = None,
+    execution: Execution | None = None,
 ) -> None:
     """Turn the cloud's normals to the side that a camera saw, in place; their lines stay as they are.
 
@@ -73,16 +80,20 @@ def orient_normals_towards_camera_location(
 
     Parameters
     ----------
-    pcd, params
+    pcd, params, execution
         As in `orient_normals_consistent_tangent_plane`, and so are the errors.
     camera_location : (3,) array_like or open3d.core.Tensor
         In the unit of the points. Also (k, 3), of several cameras.
     """
-    _orient(pcd, params, viewpoints=_array(camera_location))
+    _orient(pcd, params, execution, viewpoints=_array(camera_location))
 
 
 def orient_normals_to_align_with_direction(
-    pcd: Any, orientation_reference: Any = (0.0, 0.0, 1.0), *, params: Params | None = None
+    pcd: Any,
+    orientation_reference: Any = (0.0, 0.0, 1.0),
+    *,
+    params: Params | None = None,
+    execution: Execution | None = None,
 ) -> None:
     """Turn the cloud's normals to the side from which it is seen from afar in a direction, in place.
 
@@ -91,17 +102,18 @@ def orient_normals_to_align_with_direction(
 
     Parameters
     ----------
-    pcd, params
+    pcd, params, execution
         As in `orient_normals_consistent_tangent_plane`, and so are the errors.
     orientation_reference : (3,) array_like or open3d.core.Tensor
         Of any length.
     """
-    _orient(pcd, params, up=_array(orientation_reference))
+    _orient(pcd, params, execution, up=_array(orientation_reference))
 
 
-def _orient(pcd: Any, params: Params | None, **seen: Any) -> None:
+def _orient(pcd: Any, params: Params | None, execution: Execution | None, **seen: Any) -> None:
     if not is_empty(pcd):
-        set_normals(pcd, estimate.orient_normals(points_of(pcd), normals_of(pcd), params, **seen))
+        oriented = estimate.orient_normals(points_of(pcd), normals_of(pcd), params, execution=execution, **seen)
+        set_normals(pcd, oriented)
 
 
 def _array(values: Any) -> NDArray[Any]:

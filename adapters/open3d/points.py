@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from face_plugin.adapters.open3d.cloud import is_empty, layer_of, points_of, select, set_normals
+from face_plugin.execution import Execution
 from face_plugin.filters import Interior, Normals
 from face_plugin.params import Params
+from face_plugin.sides.sensors import sensors_of
 
 __all__ = ["estimate_normals", "remove_interior_points"]
 
@@ -29,6 +31,7 @@ def estimate_normals(
     seen_from: ArrayLike | None = None,
     up: ArrayLike | None = None,
     params: Params | None = None,
+    execution: Execution | None = None,
     sculpt: str | os.PathLike[str] | None = None,
 ) -> None:
     """Give the cloud outward normals, in place; they need no orientation afterwards.
@@ -46,6 +49,7 @@ def estimate_normals(
     viewpoints, seen_from, up
         Where sensors stood, as in `face_plugin.estimate_normals`.
     params : Params, optional
+    execution : Execution, optional
     sculpt : path, optional
         File of charges and cage points, as of ``face mesh --sculpt``.
 
@@ -75,8 +79,9 @@ def estimate_normals(
         log.debug("FaCE has no use for %s", ", ".join(name for name, is_given in given.items() if is_given))
     if is_empty(pcd):
         return
-    layer = layer_of(pcd, sculpt, params, viewpoints, seen_from, up)
-    set_normals(pcd, Normals(params)(layer).normals)
+    settings = {"params": params, "execution": execution}
+    layer = layer_of(pcd, sculpt, sensors_of(viewpoints, seen_from, up), settings)
+    set_normals(pcd, Normals(params, execution=execution)(layer).normals)
 
 
 def remove_interior_points(
@@ -87,6 +92,7 @@ def remove_interior_points(
     seen_from: ArrayLike | None = None,
     up: ArrayLike | None = None,
     params: Params | None = None,
+    execution: Execution | None = None,
     sculpt: str | os.PathLike[str] | None = None,
 ) -> tuple[Any, Any]:
     """Drop the points inside the object, and strays; colours, covariances and attributes follow those that are kept.
@@ -97,7 +103,7 @@ def remove_interior_points(
         Stays as it is.
     alpha : float or {"auto", "dense", "sparse"}, optional
         Field strength below which space counts as inside, as in `Params`.
-    viewpoints, seen_from, up, params, sculpt
+    viewpoints, seen_from, up, params, execution, sculpt
         As in `estimate_normals`.
 
     Returns
@@ -118,5 +124,7 @@ def remove_interior_points(
     """
     keep = np.ones(len(points_of(pcd)), dtype=np.bool_)
     if not is_empty(pcd):
-        keep = Interior(alpha, params)(layer_of(pcd, sculpt, params, viewpoints, seen_from, up)).keep
+        settings = {"params": params, "execution": execution}
+        layer = layer_of(pcd, sculpt, sensors_of(viewpoints, seen_from, up), settings)
+        keep = Interior(alpha, params, execution)(layer).keep
     return select(pcd, keep)

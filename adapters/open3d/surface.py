@@ -11,8 +11,10 @@ from scipy.spatial import cKDTree
 
 from face_plugin.adapters.open3d.cloud import is_tensor, layer_of
 from face_plugin.errors import require
+from face_plugin.execution import Execution
 from face_plugin.filters import Chain, Filter, Interior, Normals, Surface
 from face_plugin.params import Params
+from face_plugin.sides.sensors import sensors_of
 
 __all__ = ["create_from_point_cloud_face"]
 
@@ -28,6 +30,7 @@ def create_from_point_cloud_face(
     seen_from: ArrayLike | None = None,
     up: ArrayLike | None = None,
     params: Params | None = None,
+    execution: Execution | None = None,
     sculpt: str | os.PathLike[str] | None = None,
 ) -> tuple[Any, Any]:
     """Reconstruct a surface as ``TriangleMesh.create_from_point_cloud_poisson`` does, needing no normals.
@@ -36,7 +39,7 @@ def create_from_point_cloud_face(
     ----------
     pcd : open3d.geometry.PointCloud or open3d.t.geometry.PointCloud
         Stays as it is; normals that it has are not used.
-    depth, screened, filter_interior, trim, viewpoints, seen_from, up, params
+    depth, screened, filter_interior, trim, viewpoints, seen_from, up, params, execution
         As in `face_plugin.reconstruct`.
     sculpt : path, optional
         File of charges and cage points, as of ``face mesh --sculpt``.
@@ -59,8 +62,9 @@ def create_from_point_cloud_face(
     """
     o3d = require("open3d", extra="open3d")
     middle: list[Filter] = [Interior()] if filter_interior else []
-    chain = Chain([Normals(params), *middle, Surface(depth, screened, "open3d", trim)])
-    layer = chain(layer_of(pcd, sculpt, params, viewpoints, seen_from, up))
+    chain = Chain([Normals(params, execution=execution), *middle, Surface(depth, screened, "open3d", trim)])
+    settings = {"params": params, "execution": execution}
+    layer = chain(layer_of(pcd, sculpt, sensors_of(viewpoints, seen_from, up), settings))
     surface = layer.surface
     assert surface is not None  # the chain ends with it
     mesh = o3d.geometry.TriangleMesh(

@@ -25,7 +25,7 @@ def compute_normal_by_faraday_cage(ms: Any, **parameters: Any) -> None:
     flipflag, viewpos : bool, (3,) array_like
         Whether normals point to what is seen from a viewpoint, and where that is.
     alpha, cage_spacing, ...
-        Settings of `face_plugin.Params`.
+        Settings of `face_plugin.Params` and `face_plugin.Execution`.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def compute_selection_by_faraday_interior(ms: Any, **parameters: Any) -> None:
     ----------
     ms : pymeshlab.MeshSet
     alpha, cage_spacing, ...
-        Settings of `face_plugin.Params`.
+        Settings of `face_plugin.Params` and `face_plugin.Execution`.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def compute_scalar_by_faraday_strength(ms: Any, **parameters: Any) -> None:
     onselected : bool
         Change the scalars of the selected vertices only.
     cage_spacing, ...
-        Settings of `face_plugin.Params`.
+        Settings of `face_plugin.Params` and `face_plugin.Execution`.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def generate_surface_reconstruction_faraday(ms: Any, **parameters: Any) -> None:
     depth, screened, filter_interior
         As in `face_plugin.reconstruct`.
     alpha, cage_spacing, ...
-        Settings of `face_plugin.Params`.
+        Settings of `face_plugin.Params` and `face_plugin.Execution`.
 
     Examples
     --------

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from face_plugin.adapters.pymeshlab import layer as layers
-from face_plugin.adapters.pymeshlab.parameters import params_of
+from face_plugin.adapters.pymeshlab.parameters import settings_in
 from face_plugin.adapters.pymeshlab.script import Element, kept_script
 from face_plugin.adapters.pymeshlab.table import FILTERS, Values
 from face_plugin.errors import MeshingError, require
@@ -82,6 +82,6 @@ def _apply(ms: Any, name: str, values_of: Callable[[float], dict[str, Any]]) -> 
     try:
         with kept_script(ms, step):
             layer = PointSet(points, sensors=sensors_of(values["viewpos"]) if values["flipflag"] else None)
-            entry.run(ms, sculpted(layer, values["sculpt"] or None, params_of(values)), values)
+            entry.run(ms, sculpted(layer, values["sculpt"] or None, **settings_in(values)), values)
     except (ValueError, OSError, MeshingError, ml.PyMeshLabException) as error:
         raise ml.PyMeshLabException(f"Failed to apply filter: {name}\nDetails: {error}") from error

@@ -12,9 +12,10 @@ import numpy as np
 
 from face_plugin.adapters.pymeshlab.script import Element
 from face_plugin.errors import require
-from face_plugin.params import CHOICES, Params
+from face_plugin.execution import Execution
+from face_plugin.params import CHOICES, Params, settings_of
 
-__all__ = ["Parameter", "common_parameters", "params_of"]
+__all__ = ["Parameter", "common_parameters", "settings_in"]
 
 Kind = Literal["bool", "int", "float", "str", "enum", "length", "position"]
 TYPES: dict[str, str] = {
@@ -123,9 +124,9 @@ class Parameter:
 
 
 def common_parameters() -> tuple[Parameter, ...]:
-    """Return the settings of `Params`, under their own names."""
-    found, hints = [], get_type_hints(Params)
-    for field in dataclasses.fields(Params):
+    """Return the settings of `Params` and `Execution`, under their own names."""
+    found, hints = [], get_type_hints(Params) | get_type_hints(Execution)
+    for field in (*dataclasses.fields(Params), *dataclasses.fields(Execution)):
         types = get_args(hints[field.name]) or (hints[field.name],)
         kind: Kind = "float" if float in types else "int" if int in types else "str"
         if field.name in CHOICES:
@@ -140,11 +141,8 @@ def common_parameters() -> tuple[Parameter, ...]:
     return tuple(found)
 
 
-def params_of(values: Mapping[str, Any]) -> Params:
-    """Make the `Params` of the values of a filter's parameters."""
-    given = {}
-    for parameter in common_parameters():
-        value = values[parameter.name]
-        if value != 0 or parameter.text != AUTOMATIC:
-            given[parameter.name] = value
-    return Params(**given)
+def settings_in(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Make `params` and `execution` of the values of a filter's parameters."""
+    given = {entry.name: values[entry.name] for entry in common_parameters() if entry.text != AUTOMATIC}
+    numbers = {entry.name: values[entry.name] for entry in common_parameters() if entry.text == AUTOMATIC}
+    return settings_of(given | {name: value for name, value in numbers.items() if value != 0})

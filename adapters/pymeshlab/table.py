@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from face_plugin.adapters.pymeshlab import layer as layers
-from face_plugin.adapters.pymeshlab.parameters import Parameter, common_parameters, params_of
+from face_plugin.adapters.pymeshlab.parameters import Parameter, common_parameters, settings_in
 from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
 
 __all__ = ["FILTERS", "MeshLabFilter", "Values", "python_name"]
@@ -34,24 +34,24 @@ class MeshLabFilter:
 
 
 def _normals(ms: Any, layer: PointSet, values: Values) -> None:
-    normals = Normals(params_of(values))(layer).normals
+    normals = Normals(**settings_in(values))(layer).normals
     assert normals is not None  # the step gives them
     layers.write_normals(ms, normals, values["onselected"])
 
 
 def _interior(ms: Any, layer: PointSet, values: Values) -> None:
-    layers.write_selection(ms, Interior(params=params_of(values))(layer).attributes["interior"])
+    layers.write_selection(ms, Interior(**settings_in(values))(layer).attributes["interior"])
 
 
 def _strength(ms: Any, layer: PointSet, values: Values) -> None:
-    strength = Normals(params_of(values))(layer).attributes["strength"]
+    strength = Normals(**settings_in(values))(layer).attributes["strength"]
     layers.write_scalar(ms, strength, values["onselected"])
 
 
 def _surface(ms: Any, layer: PointSet, values: Values) -> None:
     middle: list[Filter] = [Interior()] if values["filter_interior"] else []
     last = Surface(values["depth"], values["screened"], "pymeshlab")
-    surface = Chain([Normals(params_of(values)), *middle, last])(layer).surface
+    surface = Chain([Normals(**settings_in(values)), *middle, last])(layer).surface
     assert surface is not None  # the chain ends with it
     layers.add_surface(ms, surface.vertices, surface.faces, "Faraday mesh")
 

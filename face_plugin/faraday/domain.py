@@ -122,7 +122,7 @@ def fill(
             raise MeshingError(
                 f"the space between {len(balls.radii)} balls takes more than {most:.0f} free vertices, which is "
                 "what the memory allowed holds; try a larger Params.finest, Params.grading or "
-                "Params.cage_spacing, Params.tile_points, or Params.max_memory"
+                "Params.cage_spacing, Execution.tile_points, or Execution.max_memory"
             )
         leaf, leaf_cell = centre[~split], cell[~split]
         jittered = leaf + rng.uniform(-JITTER, JITTER, leaf.shape) * size

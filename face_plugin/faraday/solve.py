@@ -55,6 +55,7 @@ def solve_cage(
     box: Box | None = None,
     given: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     cage_value: NDArray[np.float64] | None = None,
+    memory: float | None = None,
     stage: Stage = nullcontext,
 ) -> SolvedCage:
     """Build a cage on points and solve its three basis potentials (paper sections 3.1 and 3.2).
@@ -71,6 +72,8 @@ def solve_cage(
         Potential (q, 3) at positions (q, 3) on the box; by default that of unit fields along the axes.
     cage_value : (3,) float64, optional
         Potential of the cage; by default it floats at zero net charge.
+    memory : float, optional
+        Bytes that meshing may take, by default all that are free.
     stage : callable, optional
         Entered for "domain", "mesh" and "poisson".
 
@@ -85,7 +88,8 @@ def solve_cage(
     """
     for attempt in range(ATTEMPTS):
         try:
-            balls, mesh = _mesh(points, separation, dataclasses.replace(params, seed=params.seed + attempt), box, stage)
+            another = dataclasses.replace(params, seed=params.seed + attempt)
+            balls, mesh = _mesh(points, separation, another, box, memory, stage)
             break
         except MeshingError as error:
             if attempt == ATTEMPTS - 1:
@@ -100,7 +104,12 @@ def solve_cage(
 
 
 def _mesh(
-    points: NDArray[np.float64], separation: NDArray[np.float64], params: Params, box: Box | None, stage: Stage
+    points: NDArray[np.float64],
+    separation: NDArray[np.float64],
+    params: Params,
+    box: Box | None,
+    memory: float | None,
+    stage: Stage,
 ) -> tuple[Balls, CageMesh]:
     # The domain: a box without conducting balls, no two of which are nearer than their separation.
     with stage("domain"):
@@ -113,7 +122,7 @@ def _mesh(
         spacing = local_spacing(balls.centres)
     # Tetrahedra between the box and the balls, graded from these to it.
     with stage("mesh"):
-        return balls, build_mesh(balls, spacing, box, params)
+        return balls, build_mesh(balls, spacing, box, params, memory)
 
 
 def _within(balls: Balls, box: Box) -> Balls:

@@ -146,7 +146,7 @@ class Coarse:
             return cls(mesh, arrays["potential"], arrays["cage_value"], Locator(mesh))
 
 
-def solve_coarse(voxels: Voxels, params: Params) -> Coarse:
+def solve_coarse(voxels: Voxels, params: Params, memory: float | None = None) -> Coarse:
     """Solve a cage of evenly spaced points over the whole cloud.
 
     Parameters
@@ -154,9 +154,11 @@ def solve_coarse(voxels: Voxels, params: Params) -> Coarse:
     voxels : Voxels
         The points chosen.
     params : Params
+    memory : float, optional
+        Bytes that meshing may take, by default all that are free.
     """
     # Neighbouring voxels may hold points that nearly touch: their balls would be small and the gaps beside
     # them wide.
     separation = np.full(len(voxels.points), VOXELS_APART * voxels.size)
-    cage = solve_cage(voxels.points, separation, params)
+    cage = solve_cage(voxels.points, separation, params, memory=memory)
     return Coarse(cage.mesh, cage.potential, cage.cage_value, Locator(cage.mesh))

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from face_plugin.errors import FaceError, require
-from face_plugin.tiles.engines import Job
+from face_plugin.execution import Job
 
 __all__ = ["Dask"]
 
@@ -97,5 +97,5 @@ class Dask:
         except self._distributed.KilledWorker as error:
             raise FaceError(
                 f"Dask lost the workers of a tile again and again, probably for lack of memory ({error}): "
-                "lower Params.tile_points, or give the workers more memory"
+                "lower Execution.tile_points, or give the workers more memory"
             ) from error

@@ -17,36 +17,18 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
-from types import TracebackType
-from typing import Any, Protocol
+from typing import Any
 
 from face_plugin.errors import FaceError
+from face_plugin.execution import Engine, Job
 from face_plugin.tiles.tile import warm_up
 
 __all__ = ["Engine", "Job", "Processes", "Serial"]
 
 log = logging.getLogger(__name__)
 
-Job = Callable[[str, int], int]
-"""Does a tile of the store in a folder, and returns its number."""
-
 # Losses of workers in a row, without a single tile done between, after which a run gives up.
 MOST_LOSSES = 3
-
-
-class Engine(Protocol):
-    """Runs a job on every tile; a context manager."""
-
-    def __enter__(self) -> Engine:
-        """Start whatever the tiles will run on."""
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop it again."""
-
-    def run(self, job: Job, folder: str, tiles: Sequence[int], done: Callable[[int], None]) -> None:
-        """Run `job` on each tile, and call `done` with its number when it is finished."""
 
 
 class Serial:
@@ -109,7 +91,7 @@ class Processes:
                 if losses == MOST_LOSSES:
                     raise FaceError(
                         f"processes that solve tiles died {losses} times in a row, {len(left)} tiles left, "
-                        "probably for lack of memory: lower Params.tile_points or Params.max_memory"
+                        "probably for lack of memory: lower Execution.tile_points or Execution.max_memory"
                     ) from None
                 self.workers = max(1, self.workers - (losses > 0))
                 log.warning("a process died; going on with %d tiles and %d workers", len(left), self.workers)

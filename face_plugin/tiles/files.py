@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.execution import Execution, allowed_memory
 from face_plugin.io.cloudfile import replacing
 from face_plugin.io.disk import claimed
 from face_plugin.io.sinks import WRITERS, Columns
 from face_plugin.io.sources import STREAMED, Source, open_source
-from face_plugin.params import Params
+from face_plugin.params import Params, settled
 from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Progress
-from face_plugin.tiles.plan import PROCESS_BYTES, EngineLike, allowed_memory
+from face_plugin.tiles.plan import PROCESS_BYTES, SHARE
 from face_plugin.tiles.run import collect, solve_store
 
 __all__ = ["FileResult", "normals_of_file", "streams", "work_folder"]
@@ -60,17 +61,17 @@ def work_folder(output: Path) -> Path:
     return output.with_name(f".{output.name}.face")
 
 
-def streams(source: Path, output: Path, params: Params) -> bool:
+def streams(source: Path, output: Path, execution: Execution) -> bool:
     """Whether a file is too large for the memory allowed and can be worked on in parts.
 
     Examples
     --------
-    >>> streams(Path("cloud.xyz"), Path("cloud.ply"), Params())
+    >>> streams(Path("cloud.xyz"), Path("cloud.ply"), Execution())
     False
     """
     if source.suffix.lower() not in STREAMED or output.suffix.lower() not in STREAMED:
         return False
-    return open_source(source).count * HELD_BYTES + PROCESS_BYTES > allowed_memory(params)
+    return open_source(source).count * HELD_BYTES + PROCESS_BYTES > allowed_memory(execution.memory, SHARE)
 
 
 def normals_of_file(
@@ -82,7 +83,7 @@ def normals_of_file(
     filter_interior: bool = False,
     mark_interior: bool = False,
     scalars: bool = False,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> FileResult:
@@ -105,7 +106,7 @@ def normals_of_file(
         Write whether each point is inside, as ``interior`` (0 or 1).
     scalars : bool
         Write ``strength`` and ``confidence`` of each point.
-    engine : str, Engine or distributed.Client, optional
+    execution : Execution, optional
     resume : bool
         Go on from what an interrupted run left.
     progress : callable, optional
@@ -128,16 +129,16 @@ def normals_of_file(
     >>> from face_plugin.shapes import sphere
     >>> folder = Path(tempfile.mkdtemp())
     >>> np.save(folder / "ball.npy", sphere(3000).points)
-    >>> params = Params(tile_points=1500, engine="serial")
-    >>> normals_of_file(folder / "ball.npy", folder / "ball.ply", params).written
+    >>> serial = Execution(tile_points=1500, engine="serial")
+    >>> normals_of_file(folder / "ball.npy", folder / "ball.ply", execution=serial).written
     3000
     """
-    source, output, params = Path(source), Path(output), params or Params()
+    source, output, (params, execution) = Path(source), Path(output), settled(params, execution)
     if output.suffix.lower() not in WRITERS:
         raise ValueError(f"{output}: cannot be written in parts; allowed are {', '.join(WRITERS)}")
     report = progress or (lambda stage, fraction: None)
     opened = open_source(source)
-    chunk = int(np.clip(allowed_memory(params) / 4 / PART_BYTES, *PART_POINTS))
+    chunk = int(np.clip(allowed_memory(execution.memory, SHARE) / 4 / PART_BYTES, *PART_POINTS))
     folder = work_folder(output)
     interior = filter_interior or mark_interior
     with _working(folder, output, resume):
@@ -147,7 +148,7 @@ def normals_of_file(
             params,
             sensors=sensors,
             classify=interior,
-            engine=engine,
+            execution=execution,
             resume=resume,
             progress=progress,
             chunk=chunk,

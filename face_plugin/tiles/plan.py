@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias
-
-from face_plugin.memory import GIGABYTE, available_memory, usable_cores
-from face_plugin.params import SMALLEST_TILE, Params
-from face_plugin.tiles.engines import Engine, Processes, Serial
-
-if TYPE_CHECKING:
-    from distributed import Client
+from face_plugin.execution import SMALLEST_TILE, DaskClient, Engine, Execution, allowed_memory
+from face_plugin.memory import GIGABYTE, usable_cores
+from face_plugin.tiles.engines import Processes, Serial
 
 __all__ = [
     "ONE_PIECE",
+    "SHARE",
     "TILE_POINTS",
-    "EngineLike",
-    "allowed_memory",
     "check_one_piece",
     "fitting_tile_points",
     "in_tiles",
@@ -24,12 +18,12 @@ __all__ = [
     "tile_size",
 ]
 
-EngineLike: TypeAlias = "str | Engine | Client | None"
-
 ONE_PIECE = 100_000
-"""Points up to which a cloud is solved in one piece unless `Params.tile_points` says otherwise."""
+"""Points up to which a cloud is solved in one piece unless `Execution.tile_points` says otherwise."""
 TILE_POINTS = 40_000
-"""Points of a tile unless `Params.tile_points` says otherwise."""
+"""Points of a tile unless `Execution.tile_points` says otherwise."""
+SHARE = 0.5
+"""Share of the free memory that tiles take unless `Execution.max_memory` says otherwise: others need some as well."""
 
 
 # Measured (docs/scaling.md): an interpreter with this package and a coarse level loaded, a point of a tile or of its
@@ -39,41 +33,36 @@ POINT_BYTES = 17.5e3
 HALO_SIDE = 33.0
 
 
-def allowed_memory(params: Params) -> float:
-    """Bytes that all processes together may take, half of what is free unless `params` says otherwise."""
-    return 0.5 * available_memory() if params.max_memory is None else params.max_memory * GIGABYTE
-
-
-def in_tiles(count: int, params: Params) -> bool:
+def in_tiles(count: int, execution: Execution) -> bool:
     """Whether a cloud of `count` points is solved in tiles.
 
     Examples
     --------
-    >>> in_tiles(1_000_000, Params()), in_tiles(5_000, Params()), in_tiles(5_000, Params(tile_points=2_000))
+    >>> in_tiles(1_000_000, Execution()), in_tiles(5_000, Execution()), in_tiles(5_000, Execution(tile_points=2_000))
     (True, False, True)
     """
-    if params.tile_points is not None:
-        return count > params.tile_points
-    return count > ONE_PIECE or tile_memory(count) > allowed_memory(params)
+    if execution.tile_points is not None:
+        return count > execution.tile_points
+    return count > ONE_PIECE or tile_memory(count) > allowed_memory(execution.memory, SHARE)
 
 
-def check_one_piece(count: int, params: Params, purpose: str) -> None:
+def check_one_piece(count: int, execution: Execution, purpose: str) -> None:
     """Refuse to solve a cloud in one piece where the memory does not bear it.
 
     Parameters
     ----------
     count : int
         Points of the cloud.
-    params : Params
+    execution : Execution
     purpose : str
         What needs the cloud in one piece.
 
     Raises
     ------
     ValueError
-        It takes more than `Params.max_memory`, or than all that is free.
+        It takes more than `Execution.max_memory`, or than all that is free.
     """
-    free = available_memory() if params.max_memory is None else params.max_memory * GIGABYTE
+    free = allowed_memory(execution.memory)
     needed = tile_memory(count)
     if needed > free:
         raise ValueError(
@@ -82,27 +71,24 @@ def check_one_piece(count: int, params: Params, purpose: str) -> None:
         )
 
 
-def tile_size(count: int, params: Params) -> int:
+def tile_size(count: int, execution: Execution) -> int:
     """Points aimed at for a tile: such that at least one fits into the memory.
 
     Raises
     ------
     ValueError
-        `Params.max_memory` is too little for any tile.
+        `Execution.max_memory` is too little for any tile.
     """
-    wanted = TILE_POINTS if params.tile_points is None else params.tile_points
-    return fitting_tile_points(allowed_memory(params), min(wanted, count))
+    wanted = TILE_POINTS if execution.tile_points is None else execution.tile_points
+    return fitting_tile_points(allowed_memory(execution.memory, SHARE), min(wanted, count))
 
 
-def make_engine(engine: EngineLike, params: Params, tile_points: int, count: int) -> Engine:
-    """Return the engine that `engine`, or else `params`, asks for.
+def make_engine(execution: Execution, tile_points: int, count: int) -> Engine:
+    """Return the engine that is asked for.
 
     Parameters
     ----------
-    engine : str, Engine or distributed.Client, optional
-        "auto", "serial", "processes", "dask", the address of a Dask scheduler, a client of one, or an object
-        with the methods of `Engine`.
-    params : Params
+    execution : Execution
     tile_points : int
         Points of a tile.
     count : int
@@ -110,17 +96,14 @@ def make_engine(engine: EngineLike, params: Params, tile_points: int, count: int
 
     Raises
     ------
-    ValueError
-        It is none of these.
     MissingDependencyError
         Dask is asked for and is not installed.
     """
-    chosen: Any = params.engine if engine is None else engine
-    memory = allowed_memory(params)
+    chosen, memory = execution.engine, allowed_memory(execution.memory, SHARE)
     # This process holds no tile while others do, but it is there.
     fit = int((memory - PROCESS_BYTES) / tile_memory(tile_points))
     tiles = -(-count // tile_points)
-    workers = max(1, min(params.workers or usable_cores(), fit, tiles))
+    workers = max(1, min(execution.workers or usable_cores(), fit, tiles))
     if chosen == "auto":
         chosen = "processes" if workers > 1 else "serial"
     if chosen == "serial":
@@ -128,19 +111,12 @@ def make_engine(engine: EngineLike, params: Params, tile_points: int, count: int
     if chosen == "processes":
         # With a tile for each, to start one process more would take longer than what it saves.
         return Processes(workers, takes_part=tiles <= workers)
-    if isinstance(chosen, str) and chosen != "dask" and "://" not in chosen:
-        raise ValueError(
-            "engine must be 'auto', 'serial', 'processes', 'dask' or an address such as 'tcp://host:8786', "
-            f"found {chosen!r}"
-        )
-    if isinstance(chosen, str) or hasattr(chosen, "scheduler_info"):
+    # A client has the methods of an engine as well.
+    if isinstance(chosen, (str, DaskClient)):
         from face_plugin.tiles.dask_engine import Dask
 
         return Dask(None if chosen == "dask" else chosen, workers, int(tile_memory(tile_points) * 2))
-    if not all(hasattr(chosen, name) for name in ("__enter__", "__exit__", "run")):
-        raise ValueError(f"engine must be a name, an address, a Client or an Engine, found {chosen!r}")
-    own: Engine = chosen
-    return own
+    return chosen
 
 
 def tile_memory(points: float) -> float:

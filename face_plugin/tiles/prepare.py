@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from face_plugin import cloud
 from face_plugin.cloud import Frame
+from face_plugin.execution import Execution, allowed_memory
 from face_plugin.io.disk import allocated
 from face_plugin.io.sources import CHUNK, Source
 from face_plugin.params import Params
 from face_plugin.sides.sensors import Sensors
 from face_plugin.tiles.coarse import VOXELS_PER_POINT, Voxels, voxel_size
 from face_plugin.tiles.partition import Partition, split
-from face_plugin.tiles.plan import allowed_memory, fitting_tile_points
+from face_plugin.tiles.plan import SHARE, fitting_tile_points
 from face_plugin.tiles.store import Store
 
 __all__ = ["SAMPLE", "fill_store", "store_key"]
@@ -36,13 +37,13 @@ COARSE_POINTS = (500, 6_000)
 # Beyond that many points for each of the coarse ones, these become more.
 MOST_A_COARSE = 500
 
-# Settings that decide how the work is done and not what comes out.
-_NOT_IN_KEY = ("max_memory", "engine", "workers")
 
-
-def store_key(source: Source, params: Params, interior: bool, sensors: Sensors | None = None) -> str:
+def store_key(
+    source: Source, params: Params, execution: Execution, interior: bool, sensors: Sensors | None = None
+) -> str:
     """Hash of the input and of the settings that the outcome depends on."""
-    settings = {name: value for name, value in params.to_dict().items() if name not in _NOT_IN_KEY}
+    # Of the execution only the size of the tiles has a share in what comes out.
+    settings = {**params.to_dict(), "tile_points": execution.tile_points}
     text = json.dumps(
         [source.digest(), settings, interior, None if sensors is None else sensors.to_dict()], sort_keys=True
     )
@@ -58,6 +59,7 @@ def fill_store(
     interior: bool,
     key: str = "",
     chunk: int = CHUNK,
+    memory: float | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> tuple[Store, Voxels]:
     """Sort a cloud into tiles on disk, and choose the points of the coarse level.
@@ -78,6 +80,8 @@ def fill_store(
         Kept with the store.
     chunk : int
         Points held at once.
+    memory : float, optional
+        Bytes that all processes together may take, kept with the store; by default a share of what is free.
     progress : callable, optional
 
     Returns
@@ -91,8 +95,8 @@ def fill_store(
     ValueError
         The cloud is not finite, or too small or flat, as `face_plugin.cloud.prepare` says.
     """
-    memory = allowed_memory(params)
-    sample = _sample(source, chunk, int(np.clip(memory / SAMPLE_BYTES / 2, *SAMPLE)))
+    allowed = allowed_memory(memory, SHARE)
+    sample = _sample(source, chunk, int(np.clip(allowed / SAMPLE_BYTES / 2, *SAMPLE)))
     prepared = cloud.prepare(sample)
     frame, plane = prepared.frame, prepared.plane_normal() if prepared.flat else None
     del prepared
@@ -101,7 +105,7 @@ def fill_store(
     # Rounded up: a tile larger than asked for may not fit into the memory.
     partition = split(unit_sample, max(1, -(-source.count // tile_points)))
     target = max(int(np.clip(source.count // COARSE_SHARE, *COARSE_POINTS)), source.count // MOST_A_COARSE)
-    target = fitting_tile_points(memory, target)
+    target = fitting_tile_points(allowed, target)
     size = voxel_size(unit_sample, int(VOXELS_PER_POINT * target))
     # The sample may miss the outermost points: voxels start below any that there can be.
     origin = unit_sample.min(axis=0) - 1000 * size
@@ -109,7 +113,7 @@ def fill_store(
     progress(0.5)
     start = np.concatenate([[0], np.cumsum(count)])
     dtype = cloud.as_points(np.empty((0, 3), source.dtype)).dtype
-    store = Store(folder, params, frame, start, bounds, dtype, interior, key, size, plane)
+    store = Store(folder, params, frame, start, bounds, dtype, interior, key, size, plane, memory=memory)
     store.write_whole("voxels", points=voxels.points, tile=partition.assign(voxels.points))
     _place(store, source, partition, chunk)
     progress(1.0)

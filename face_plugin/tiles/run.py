@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
+from face_plugin.execution import Engine, Execution, Job
 from face_plugin.io.disk import allocated
 from face_plugin.io.sources import CHUNK, ArraySource, Source
-from face_plugin.params import Params
+from face_plugin.params import Params, settled
 from face_plugin.result import Result
 from face_plugin.sides import enclosure
 from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Clock, Progress
 from face_plugin.tiles.coarse import Voxels, solve_coarse
-from face_plugin.tiles.engines import Engine, Job
-from face_plugin.tiles.plan import EngineLike, make_engine, tile_size
+from face_plugin.tiles.plan import make_engine, tile_size
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.scene import write_far
 from face_plugin.tiles.store import Store
@@ -38,7 +38,7 @@ def estimate_tiled(
     *,
     sensors: Sensors | None = None,
     filter_interior: bool = False,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
     progress: Progress | None = None,
 ) -> Result:
     """Outward normals of a large cloud, solved in tiles; arguments and result as of `estimate_normals`.
@@ -51,8 +51,7 @@ def estimate_tiled(
         Where sensors stood, in the unit of the points.
     filter_interior : bool
         Also classify the points as interior or not.
-    engine : str, Engine or distributed.Client, optional
-        Who solves the tiles; by default `Params.engine`.
+    execution : Execution, optional
     progress : callable, optional
         ``progress(stage, fraction)`` with the stages "cloud", "coarse", "tiles" and "normals".
 
@@ -74,11 +73,11 @@ def estimate_tiled(
     --------
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(3000)
-    >>> normals = estimate_tiled(ball.points, Params(tile_points=1500, engine="serial")).normals
+    >>> normals = estimate_tiled(ball.points, execution=Execution(tile_points=1500, engine="serial")).normals
     >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
-    params = params or Params()
+    params, execution = settled(params, execution)
     source = ArraySource(cloud.as_points(points))
     with tempfile.TemporaryDirectory(prefix="face-") as folder:
         store, timings = solve_store(
@@ -87,7 +86,7 @@ def estimate_tiled(
             params,
             sensors=sensors,
             classify=filter_interior,
-            engine=engine,
+            execution=execution,
             progress=progress,
         )
         found = collect(store)
@@ -111,7 +110,7 @@ def solve_store(
     *,
     sensors: Sensors | None = None,
     classify: bool = False,
-    engine: EngineLike = None,
+    execution: Execution | None = None,
     resume: bool = False,
     chunk: int = CHUNK,
     progress: Progress | None = None,
@@ -128,7 +127,7 @@ def solve_store(
         Where sensors stood.
     classify : bool
         Also tell which points lie inside.
-    engine : str, Engine or distributed.Client, optional
+    execution : Execution, optional
     resume : bool
         Go on from what the folder holds.
     chunk : int
@@ -147,21 +146,24 @@ def solve_store(
     ValueError
         With `resume`: the folder holds work on another input or with other settings.
     """
+    params, execution = settled(params, execution)
     clock, report = Clock(progress), progress or (lambda stage, fraction: None)
     if sensors is not None and sensors.seen_from is not None:
         raise ValueError(
             f"seen_from cannot be given for {source.count} points, which are solved in tiles: give viewpoints alone, "
-            "or a larger Params.tile_points"
+            "or a larger Execution.tile_points"
         )
-    key = store_key(source, params, classify, sensors)
+    key = store_key(source, params, execution, classify, sensors)
     store = _found(folder, key) if resume else None
-    points = tile_size(source.count, params)
-    with make_engine(engine, params, points, source.count) as running:
+    points = tile_size(source.count, execution)
+    with make_engine(execution, points, source.count) as running:
         if store is None:
             with clock("cloud"):
-                store, voxels = fill_store(folder, source, params, points, interior=classify, key=key, chunk=chunk)
+                store, voxels = fill_store(
+                    folder, source, params, points, interior=classify, key=key, chunk=chunk, memory=execution.memory
+                )
             with clock("coarse"):
-                _solve_coarse(voxels, params, folder)
+                _solve_coarse(voxels, store)
             if sensors is not None:
                 store = dataclasses.replace(store, sensors=sensors.in_frame(store.frame))
             store.save()
@@ -173,9 +175,9 @@ def solve_store(
     return store, clock.seconds
 
 
-def _solve_coarse(voxels: Voxels, params: Params, folder: Path) -> None:
+def _solve_coarse(voxels: Voxels, store: Store) -> None:
     with one_thread():
-        solve_coarse(voxels, params).save(folder)
+        solve_coarse(voxels, store.params, store.memory).save(store.folder)
 
 
 def _found(folder: Path, key: str) -> Store | None:

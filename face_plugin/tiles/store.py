@@ -27,7 +27,7 @@ from face_plugin.sides.sensors import Sensors
 
 __all__ = ["Store", "Subset"]
 
-VERSION = 3
+VERSION = 4
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,8 @@ class Store:
         The normal of a cloud that lies in one plane.
     sensors : Sensors or None
         Where sensors stood, in the canonical frame.
+    memory : float or None
+        Bytes that meshing may take; None: all that are free.
     """
 
     folder: Path
@@ -80,6 +82,7 @@ class Store:
     voxel: float
     plane: NDArray[np.float64] | None = None
     sensors: Sensors | None = None
+    memory: float | None = None
 
     @property
     def tiles(self) -> int:
@@ -113,6 +116,7 @@ class Store:
                 "voxel": self.voxel,
                 "plane": None if self.plane is None else self.plane.tolist(),
                 "sensors": None if self.sensors is None else self.sensors.to_dict(),
+                "memory": self.memory,
             }
         )
         temporary = self.folder / f"store.{secrets.token_hex(4)}.tmp"
@@ -151,6 +155,7 @@ class Store:
             voxel=text["voxel"],
             plane=None if text["plane"] is None else np.array(text["plane"]),
             sensors=None if text["sensors"] is None else Sensors(**text["sensors"]),
+            memory=text["memory"],
         )
 
     def points(self, mode: Any = "r") -> NDArray[np.float64]:

@@ -119,6 +119,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         box=_box(part, params),
         given=coarse.at,
         cage_value=coarse.cage_value,
+        memory=store.memory,
         stage=clock,
     )
     found: dict[str, NDArray[np.generic]] = {}

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from face_plugin.params import Params
+from face_plugin.execution import Execution
+from face_plugin.params import Params, settled
 from face_plugin.result import Result
 from face_plugin.sides.given import checked_trust, given_lines
 from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Progress
-from face_plugin.tiles.plan import EngineLike
 from face_plugin.tiles.run import estimate_tiled
 
 __all__ = ["Tiled"]
@@ -30,8 +30,7 @@ class Tiled:
         Where sensors stood; which of them saw which point cannot be given in tiles.
     classify : bool
         Classify the points in the pass for the normals: cheaper than another pass, if it will be asked for.
-    engine : str, Engine or distributed.Client, optional
-        Who solves the tiles; by default `Params.engine`.
+    execution : Execution, optional
     progress : callable, optional
         ``progress(stage, fraction)``.
 
@@ -39,7 +38,7 @@ class Tiled:
     --------
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(2500)
-    >>> tiled = Tiled(ball.points, Params(tile_points=1500, engine="serial"))
+    >>> tiled = Tiled(ball.points, execution=Execution(tile_points=1500, engine="serial"))
     >>> bool(((tiled.result().normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
@@ -51,11 +50,11 @@ class Tiled:
         *,
         sensors: Sensors | None = None,
         classify: bool = False,
-        engine: EngineLike = None,
+        execution: Execution | None = None,
         progress: Progress | None = None,
     ) -> None:
-        self.params = params or Params()
-        self._points, self._classify, self._engine, self._progress = points, classify, engine, progress
+        self.params, self.execution = settled(params, execution)
+        self._points, self._classify, self._progress = points, classify, progress
         self._sensors = sensors
         self._result: Result | None = None
 
@@ -84,7 +83,7 @@ class Tiled:
         result = self.result()
         given, lines = given_lines(normals, len(result.normals))
         if checked_trust(trusted, len(lines)) is not None:
-            raise ValueError("trusted needs the cloud in one piece: a larger Params.tile_points or max_memory")
+            raise ValueError("trusted needs the cloud in one piece: a larger Execution.tile_points or max_memory")
         side = np.einsum("nd,nd->n", lines, result.normals)
         return np.where(side[:, None] < 0, -given, given)
 
@@ -99,6 +98,6 @@ class Tiled:
             params,
             sensors=self._sensors,
             filter_interior=classify,
-            engine=self._engine,
+            execution=self.execution,
             progress=self._progress,
         )

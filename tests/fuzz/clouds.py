@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from face_plugin import FaceError, Params, estimate_normals, reconstruct
+from face_plugin import Execution, FaceError, Params, estimate_normals, reconstruct
+from face_plugin.params import settings_of
 
 SIZES = (4, 5, 6, 8, 13, 30, 80, 200, 400)
 
@@ -106,7 +107,7 @@ SETTINGS: dict[str, list[Any]] = {
     "workers": [1, 3],
 }
 WRONG: list[Any] = [-1, np.nan, np.inf, "no such", [], np.array([0.1, 0.2]), b"auto", 1j, {}, True]
-FIELDS = "|".join(field.name for field in dataclasses.fields(Params))
+FIELDS = "|".join(field.name for kind in (Params, Execution) for field in dataclasses.fields(kind))
 
 
 def settings(r: np.random.Generator) -> tuple[dict[str, Any], bool]:
@@ -133,8 +134,8 @@ def case(seed: int, folder: Path) -> str:
         given = containers[str(r.choice(list(containers)))](points)
     chosen, wrong = settings(r)
     try:
-        params = Params(**chosen)
-        assert not wrong or set(chosen) & {"engine"}, f"accepted {chosen}"
+        given_settings = settings_of(chosen)
+        assert not wrong, f"accepted {chosen}"
     except ValueError as error:
         assert wrong, str(error)
         assert re.match(rf"({FIELDS}) must ", str(error)), str(error)
@@ -143,13 +144,13 @@ def case(seed: int, folder: Path) -> str:
     before = given.copy() if isinstance(given, np.ndarray) else None
     try:
         if surface:
-            made = reconstruct(given, params, depth=int(r.integers(2, 6)))
+            made = reconstruct(given, **given_settings, depth=int(r.integers(2, 6)))
             assert np.isfinite(made.vertices).all()
             assert made.faces.min() >= 0
             assert made.faces.max() < len(made.vertices)
             result = made.result
         else:
-            result = estimate_normals(given, params, filter_interior=bool(r.random() < 0.5))
+            result = estimate_normals(given, **given_settings, filter_interior=bool(r.random() < 0.5))
     except ValueError as error:
         assert re.match(r"(points|cage_spacing|max_memory) must ", str(error)), str(error)
         return "points refused" if refused else "degenerate points refused"

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from face_plugin import Params, estimate_normals, shapes
+from face_plugin import Execution, estimate_normals, shapes
 from face_plugin.io import read_cloud
 
 POINTS = shapes.sphere(2500).points
@@ -73,7 +73,7 @@ def check(output: Path, *, whole: bool) -> None:
 
 def prepare() -> None:
     for tiles in (None, 1250):
-        estimate_normals(POINTS, Params(tile_points=tiles, engine="serial"))
+        estimate_normals(POINTS, execution=Execution(tile_points=tiles, engine="serial"))
 
 
 def case(seed: int, folder: Path) -> str:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from face_plugin import FaCE, Params, estimate_normals, reconstruct, shapes
+from face_plugin import Execution, FaCE, estimate_normals, reconstruct, shapes
 from face_plugin.io import CloudFile, read_cloud, write_cloud
 
 SHAPES = (shapes.sphere, shapes.torus, shapes.teapot)
 
 
 def prepare() -> None:
-    reconstruct(shapes.sphere(2500).points, Params(tile_points=1250, engine="serial"), depth=4)
+    reconstruct(shapes.sphere(2500).points, execution=Execution(tile_points=1250, engine="serial"), depth=4)
 
 
 def case(seed: int, folder: Path) -> str:
@@ -30,10 +30,10 @@ def case(seed: int, folder: Path) -> str:
             write_cloud(path, CloudFile(points), normals=points)
             return read_cloud(path).points
 
-        tiles = Params(tile_points=1000, engine="serial")
+        tiles = Execution(tile_points=1000, engine="serial")
         jobs: list[Callable[[], np.ndarray]] = [
             lambda: estimate_normals(points).normals,
-            lambda: estimate_normals(np.r_[points, points + 3, points + 6, points + 9], tiles).normals,
+            lambda: estimate_normals(np.r_[points, points + 3, points + 6, points + 9], execution=tiles).normals,
             lambda: reconstruct(points, depth=4, backend=backend).vertices,
             lambda: FaCE(points).interior(),
             files,

@@ -13,6 +13,7 @@ from face_plugin.app.cli.options import (
     add_method,
     add_sculpt,
     add_surface,
+    execution_of,
     params_of,
     surface_of,
 )
@@ -51,7 +52,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
 
     output = check_output(args.output, MESH_SUFFIXES)
     side_output = None if args.cloud is None else check_output(args.cloud, CLOUD_SUFFIXES)
-    params, options = params_of(args), surface_of(args)
+    params, execution, options = params_of(args), execution_of(args), surface_of(args)
     with console.stage("read"):
         cloud = read_cloud(args.input)
     surface = reconstruct(
@@ -60,6 +61,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         filter_interior=args.filter_interior,
         **sensors_in(args, console, cloud),
         sculpt=args.sculpt,
+        execution=execution,
         progress=console.progress,
         **options,
     )
@@ -85,6 +87,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "closed": closed,
         "timings": result.timings,
         "params": result.params.to_dict(),
+        "execution": execution.to_dict(),
     }
     text = f"{output}: {len(surface.faces):,} triangles, {'closed' if closed else 'open'}, from "
     text += f"{kept:,} of {len(cloud):,} points"

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.app.cli.console import Console
-from face_plugin.app.cli.options import add_command, add_interior, add_method, add_sculpt, params_of
+from face_plugin.app.cli.options import add_command, add_interior, add_method, add_sculpt, execution_of, params_of
 from face_plugin.app.cli.sensors import add_sensors, sensors_in
+from face_plugin.execution import Execution
 from face_plugin.io import CLOUD_SUFFIXES, check_output, read_cloud, write_cloud
 from face_plugin.params import Params
 
@@ -45,9 +46,9 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     from face_plugin.tiles.files import streams
 
     output = check_output(args.output, CLOUD_SUFFIXES)
-    params = params_of(args)
-    if args.resume or streams(args.input, output, params):
-        return _in_parts(args, params, console)
+    params, execution = params_of(args), execution_of(args)
+    if args.resume or streams(args.input, output, execution):
+        return _in_parts(args, params, execution, console)
     with console.stage("read"):
         cloud = read_cloud(args.input)
     wanted = args.filter_interior or args.mark_interior
@@ -57,6 +58,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         filter_interior=wanted,
         **sensors_in(args, console, cloud),
         sculpt=args.sculpt,
+        execution=execution,
         progress=console.progress,
     )
     extra: dict[str, NDArray[Any]] = {}
@@ -79,12 +81,15 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "mean_confidence": float(result.confidence.mean()),
         "timings": result.timings,
         "params": result.params.to_dict(),
+        "execution": execution.to_dict(),
     }
     dropped = f", {len(cloud) - written:,} interior points and strays left out" if keep is not None else ""
     return summary, f"{output}: {written:,} points with normals{dropped}"
 
 
-def _in_parts(args: argparse.Namespace, params: Params, console: Console) -> tuple[dict[str, Any], str]:
+def _in_parts(
+    args: argparse.Namespace, params: Params, execution: Execution, console: Console
+) -> tuple[dict[str, Any], str]:
     """Estimate and write the normals of a file that is never held as a whole."""
     if args.sculpt is not None:
         raise ValueError("--sculpt needs the cloud in one piece: more --max-memory, and no --resume")
@@ -99,6 +104,7 @@ def _in_parts(args: argparse.Namespace, params: Params, console: Console) -> tup
         filter_interior=args.filter_interior,
         mark_interior=args.mark_interior,
         scalars=args.scalars,
+        execution=execution,
         resume=args.resume,
         progress=console.progress,
     )
@@ -112,6 +118,7 @@ def _in_parts(args: argparse.Namespace, params: Params, console: Console) -> tup
         "mean_confidence": done.mean_confidence,
         "timings": done.timings,
         "params": params.to_dict(),
+        "execution": execution.to_dict(),
     }
     dropped = f", {done.points - done.written:,} interior points and strays left out" if args.filter_interior else ""
     return summary, f"{args.output}: {done.written:,} points with normals{dropped}"

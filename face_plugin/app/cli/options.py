@@ -1,4 +1,4 @@
-"""Options that several subcommands share; those of the method are made from the fields of `Params`."""
+"""Options that several subcommands share; the settings are made from the fields of `Params` and `Execution`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from face_plugin.app.cli.console import Console
 from face_plugin.errors import require
+from face_plugin.execution import Execution
 from face_plugin.io import READ_SUFFIXES
 from face_plugin.params import Params
 
@@ -25,6 +26,7 @@ __all__ = [
     "add_method",
     "add_sculpt",
     "add_surface",
+    "execution_of",
     "params_of",
     "surface_of",
 ]
@@ -74,25 +76,36 @@ def add_command(
 
 
 def add_method(parser: argparse.ArgumentParser) -> None:
-    """Add one option for each field of `Params`, with its own type, choices and description."""
+    """Add one option for each field of `Params` and `Execution`, with its own type, choices and description."""
     group = parser.add_argument_group("settings of the method")
     group.add_argument("--paper", action="store_true", help="start from the settings of the paper (needs tetgen)")
-    hints, texts = get_type_hints(Params), _descriptions()
-    for field in dataclasses.fields(Params):
+    _add_fields(group, Params)
+    _add_fields(parser.add_argument_group("settings of its execution"), Execution)
+
+
+def _add_fields(group: Any, settings: type[Params | Execution]) -> None:
+    hints, texts = get_type_hints(settings), _descriptions(settings)
+    for field in dataclasses.fields(settings):
         default = "from the data" if field.default is None else field.default
         text = f"{texts.get(field.name, '')} [default: {default}]".strip().replace("%", "%%")
         flag = "--" + field.name.replace("_", "-")
-        group.add_argument(flag, dest=f"params_{field.name}", help=text, **_kind(hints[field.name]))
+        group.add_argument(flag, dest=f"setting_{field.name}", help=text, **_kind(hints[field.name]))
 
 
 def params_of(args: argparse.Namespace) -> Params:
     """Make `Params` of the options that were given."""
-    given = {
-        field.name: getattr(args, f"params_{field.name}")
-        for field in dataclasses.fields(Params)
-        if getattr(args, f"params_{field.name}") is not None
-    }
+    given = _given(args, Params)
     return Params.paper(**given) if args.paper else Params(**given)
+
+
+def execution_of(args: argparse.Namespace) -> Execution:
+    """Make `Execution` of the options that were given."""
+    return Execution(**_given(args, Execution))
+
+
+def _given(args: argparse.Namespace, settings: type[Params | Execution]) -> dict[str, Any]:
+    found = {field.name: getattr(args, f"setting_{field.name}") for field in dataclasses.fields(settings)}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _kind(hint: Any) -> dict[str, Any]:
@@ -119,10 +132,10 @@ def _alternatives(hint: Any) -> tuple[Any, ...]:
     return get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
 
 
-def _descriptions() -> dict[str, str]:
-    """Read the text under each field of `Params`: it is written once, there."""
+def _descriptions(settings: type) -> dict[str, str]:
+    """Read the text under each field: it is written once, there."""
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(Params)))
+        tree = ast.parse(textwrap.dedent(inspect.getsource(settings)))
     except OSError:
         return {}
     body = tree.body[0].body if isinstance(tree.body[0], ast.ClassDef) else []

@@ -6,7 +6,15 @@ import argparse
 from typing import Any
 
 from face_plugin.app.cli.console import Console
-from face_plugin.app.cli.options import add_command, add_method, add_sculpt, add_surface, params_of, surface_of
+from face_plugin.app.cli.options import (
+    add_command,
+    add_method,
+    add_sculpt,
+    add_surface,
+    execution_of,
+    params_of,
+    surface_of,
+)
 from face_plugin.app.cli.sensors import add_sensors, sensors_in
 from face_plugin.io import check_output, read_cloud
 from face_plugin.params import ALPHAS, Params
@@ -65,16 +73,23 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     output = check_output(args.output, plot.PLOT_SUFFIXES)
     # Said now rather than after the computation.
     require("matplotlib", extra="plot")
-    params, options = params_of(args), surface_of(args)
+    params, execution, options = params_of(args), execution_of(args), surface_of(args)
     with console.stage("read"):
         cloud = read_cloud(args.input)
     points, seen = cloud.points, sensors_in(args, console, cloud)
     if args.interior and args.sculpt is None:
-        result = estimate_normals(points, params, filter_interior=True, **seen, progress=console.progress)
+        result = estimate_normals(
+            points, params, filter_interior=True, **seen, execution=execution, progress=console.progress
+        )
     else:
         # A slice shows the field between the points.
         face = solve_whole(
-            points, params, purpose="a slice of the field", sensors=sensors_of(**seen), progress=console.progress
+            points,
+            params,
+            purpose="a slice of the field",
+            sensors=sensors_of(**seen),
+            execution=execution,
+            progress=console.progress,
         )
         if args.sculpt is not None:
             face = face.sculpted(args.sculpt)
@@ -100,7 +115,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
             level = _threshold(result.params)
             figure = plot.plot_result(points, result.normals, result.strength, field, alpha=level, **looks)
     plot.save_figure(figure, output)
-    summary.update({"timings": result.timings, "params": result.params.to_dict()})
+    summary.update({"timings": result.timings, "params": result.params.to_dict(), "execution": execution.to_dict()})
     return summary, f"{output}: picture of {len(points):,} points"
 
 

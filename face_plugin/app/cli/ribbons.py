@@ -13,6 +13,7 @@ from face_plugin.app.cli.options import (
     add_method,
     add_sculpt,
     add_surface,
+    execution_of,
     params_of,
     surface_of,
 )
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
 
     output = check_output(args.output, MESH_SUFFIXES)
     side_output = None if args.normals is None else check_output(args.normals, _SUFFIXES)
-    params = params_of(args)
+    params, execution = params_of(args), execution_of(args)
     with console.stage("read"):
         sketch = read_sketch(args.input, width=args.width)
     with console.stage("sample"):
@@ -73,6 +74,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         filter_interior=args.filter_interior,
         **sensors_in(args, console),
         sculpt=args.sculpt,
+        execution=execution,
         progress=console.progress,
         **surface_of(args),
     )
@@ -97,6 +99,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "closed": closed,
         "timings": result.timings,
         "params": result.params.to_dict(),
+        "execution": execution.to_dict(),
     }
     text = f"{output}: {len(surface.faces):,} triangles, {'closed' if closed else 'open'}, from "
     return summary, text + f"{sketch.stroke_count:,} strokes ({count - dropped:,} of {count:,} points)"

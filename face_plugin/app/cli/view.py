@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from face_plugin.app.cli.console import Console
-from face_plugin.app.cli.options import add_command, add_method, add_sculpt, params_of
+from face_plugin.app.cli.options import add_command, add_method, add_sculpt, execution_of, params_of
 from face_plugin.io import MESH_SUFFIXES, check_output, read_cloud
 
 __all__ = ["register"]
@@ -55,10 +55,10 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         check_output(args.screenshot, (".png", ".jpg"))
     # Said now rather than after the computation.
     require("polyscope", extra="viewer")
-    params = params_of(args)
+    params, execution = params_of(args), execution_of(args)
     with console.stage("read"):
         cloud = read_cloud(args.input)
-    session = Session(cloud.points, params, sculpt=args.sculpt, progress=console.progress)
+    session = Session(cloud.points, params, execution=execution, sculpt=args.sculpt, progress=console.progress)
     viewer = Viewer(
         session,
         sculpt_file=sculpt_file,
@@ -81,6 +81,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "charges": sum(edit.kind == "charge" for edit in edits),
         "cage_points": sum(edit.kind == "cage" for edit in edits),
         "params": params.to_dict(),
+        "execution": execution.to_dict(),
     }
     text = f"{args.input}: {len(cloud):,} points, {len(edits)} edits"
     return summary, text if args.screenshot is None else f"{args.screenshot}: picture of {text}"

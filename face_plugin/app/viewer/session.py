@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.cloud import as_points
 from face_plugin.estimate import solve_whole
+from face_plugin.execution import Execution
 from face_plugin.faraday.isosurface import fill_balls, isosurface
 from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
 from face_plugin.params import Params
@@ -51,6 +52,7 @@ class Session:
     ----------
     points : (n, 3) array_like of float or int, in any unit
     params : Params, optional
+    execution : Execution, optional
     sculpt : SculptFile or path, optional
         Edits to start with.
     progress : callable, optional
@@ -82,6 +84,7 @@ class Session:
         points: ArrayLike,
         params: Params | None = None,
         *,
+        execution: Execution | None = None,
         sculpt: SculptFile | str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
     ) -> None:
@@ -89,7 +92,7 @@ class Session:
         first = SculptFile() if sculpt is None else sculpt
         first = first if isinstance(first, SculptFile) else SculptFile.load(first)
         self.points = as_points(points)
-        solved = solve_whole(self.points, params, purpose="sculpting", progress=progress)
+        solved = solve_whole(self.points, params, purpose="sculpting", execution=execution, progress=progress)
         # Refining normals takes longer than an edit: they are refined when the surface is made.
         self._angles = solved.params.angles
         self._states = [solved.with_angles("field").sculpted(first)]

@@ -109,7 +109,7 @@ def check_memory(needed: float, allowed: float, what: str) -> None:
     if needed > allowed:
         raise MeshingError(
             f"{what} takes about {needed / GIGABYTE:.2g} GB, more than the allowed {allowed / GIGABYTE:.2g}; "
-            "try a larger Params.cage_spacing (fewer balls), Params.tile_points, or Params.max_memory"
+            "try a larger Params.cage_spacing (fewer balls), Execution.tile_points, or Execution.max_memory"
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.errors import MeshingError, MissingDependencyError
+from face_plugin.execution import allowed_memory
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box, fill
 from face_plugin.faraday.meshers import CageMesh, gate
@@ -82,7 +83,9 @@ MESHERS = {
 }
 
 
-def build_mesh(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Params) -> CageMesh:
+def build_mesh(
+    balls: Balls, spacing: NDArray[np.float64], box: Box, params: Params, memory: float | None = None
+) -> CageMesh:
     """Mesh the box minus the balls with the mesher that `params` names.
 
     Parameters
@@ -92,9 +95,10 @@ def build_mesh(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Par
         Local spacing at each ball.
     box : Box
     params : Params
-        Its `mesher`, `grading`, `finest`, `seed` and `max_memory`. ``mesher="auto"`` is Delaunay by gmsh;
-        where that fails, by SciPy; where that fails too, fTetWild if it is installed and the balls are few.
-        It says so in the log.
+        Its `mesher`, `grading`, `finest` and `seed`. ``mesher="auto"`` is Delaunay by gmsh; where that fails, by
+        SciPy; where that fails too, fTetWild if it is installed and the balls are few. It says so in the log.
+    memory : float, optional
+        Bytes that meshing may take, by default all that are free.
 
     Returns
     -------
@@ -120,7 +124,7 @@ def build_mesh(balls: Balls, spacing: NDArray[np.float64], box: Box, params: Par
         mesher = MESHERS[name]
         try:
             gate.check_balls(balls, spacing, box, smallest=mesher.smallest, gap=mesher.gap, clearance=mesher.clearance)
-            mesh = mesher.make(balls, spacing, box, params, _allowed_memory(params))
+            mesh = mesher.make(balls, spacing, box, params, allowed_memory(memory))
             gate.check_mesh(mesh, balls, box, advice="try another Params.mesher or a larger Params.cage_spacing")
         except MeshingError as error:
             failures.append(f"{name}: {error}")
@@ -146,10 +150,3 @@ def _candidates(mesher: str, count: int) -> list[str]:
         return [mesher]
     few = count <= PRACTICAL_BALLS
     return list(dict.fromkeys([*delaunay, "scipy", *(["tetwild"] if few else [])]))
-
-
-def _allowed_memory(params: Params) -> float:
-    """Bytes that meshing may take."""
-    from face_plugin.memory import GIGABYTE, available_memory
-
-    return available_memory() if params.max_memory is None else params.max_memory * GIGABYTE

@@ -282,4 +282,4 @@ def reconstruct(
     )
     timings = {**result.timings, "surface": time.perf_counter() - start}
     report("surface", 1.0)
-    return Surface(vertices, faces, densities, dataclasses.replace(result, timings=timings))
+    return Surface(vertices, faces, densities, result=dataclasses.replace(result, timings=timings))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from face_plugin.errors import FaceError
 from face_plugin.params import Params
 
-__all__ = ["Result", "Surface", "kept_points"]
+__all__ = ["Mesh", "Result", "Surface", "kept_points"]
 
 log = logging.getLogger(__name__)
 
@@ -71,15 +71,21 @@ def kept_points(result: Result) -> NDArray[np.bool_]:
     return kept
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A reconstructed surface."""
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of a reconstructed surface."""
 
     vertices: NDArray[np.float64]
-    """(k, 3) in the unit of the input."""
+    """(k, 3) in the unit of the points."""
     faces: NDArray[np.int64]
     """(f, 3) oriented outward."""
-    densities: NDArray[np.float64] | None
+    densities: NDArray[np.float64] | None = None
     """(k,) sampling density at the vertices, where the host gives it."""
-    result: Result
-    """The normals, and the points kept, that it was made from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(Mesh):
+    """A reconstructed surface, and what it was made from."""
+
+    result: Result = field(kw_only=True)
+    """The normals, and which points were kept."""

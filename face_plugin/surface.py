@@ -55,7 +55,7 @@ _BITS = 20
 # The hosts share state within a process: several reconstructions at once crash, PyMeshLab's more often than Open3D's.
 _one_at_a_time = threading.Lock()
 
-Mesh = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
+Arrays = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
 
 
 def poisson_reconstruction(
@@ -66,7 +66,7 @@ def poisson_reconstruction(
     screened: bool = True,
     backend: Backend | None = None,
     trim: float = 0.0,
-) -> Mesh:
+) -> Arrays:
     """Reconstruct a surface from oriented points (Kazhdan et al. 2006; screened: Kazhdan and Hoppe 2013).
 
     Parameters
@@ -171,14 +171,14 @@ def _installed() -> Backend:
 
 
 def _closed(
-    run: Callable[..., Mesh], points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float
-) -> Mesh:
+    run: Callable[..., Arrays], points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float
+) -> Arrays:
     """Reconstruct in the smallest cube in which the surface is closed: over a wide gap it bulges beyond the points.
 
     That of a sheet is closed in none, and is then that of the first.
     """
 
-    def made_in(scale: float) -> Mesh:
+    def made_in(scale: float) -> Arrays:
         with _one_at_a_time:
             return run(points, normals, depth, weight, scale)
 
@@ -198,7 +198,9 @@ def is_closed(faces: NDArray[np.integer]) -> bool:
     return len(faces) > 0 and np.array_equal(np.sort(there), np.sort(back))
 
 
-def _open3d(points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float) -> Mesh:
+def _open3d(
+    points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
+) -> Arrays:
     o3d = require("open3d", extra="open3d")
     pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     pcd.normals = o3d.utility.Vector3dVector(normals)
@@ -215,7 +217,7 @@ def _open3d(points: NDArray[np.float64], normals: NDArray[np.float64], depth: in
 
 def _pymeshlab(
     points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
-) -> Mesh:
+) -> Arrays:
     pymeshlab = require("pymeshlab", extra="pymeshlab")
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
@@ -229,7 +231,7 @@ def _pymeshlab(
 
 def _trimmed(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], densities: NDArray[np.float64], trim: float
-) -> Mesh:
+) -> Arrays:
     keep = densities >= np.quantile(densities, trim)
     faces = faces[keep[faces].all(axis=1)]
     used = np.zeros(len(vertices), dtype=np.bool_)

@@ -17,15 +17,15 @@ from face_plugin.filters.base import Filter
 from face_plugin.filters.interior import Interior
 from face_plugin.filters.normals import Normals, with_sensors
 from face_plugin.filters.pointset import PointSet
+from face_plugin.filters.reconstruct import Reconstruct
 from face_plugin.filters.sculpt import Sculpt
-from face_plugin.filters.surface import Surface
 from face_plugin.filters.thin import Thin
 from face_plugin.io.cloudfile import replacing
 from face_plugin.stages import Progress
 
 __all__ = ["FILTERS", "Chain"]
 
-FILTERS: dict[str, type[Filter]] = {step.name: step for step in (Normals, Interior, Thin, Sculpt, Surface)}
+FILTERS: dict[str, type[Filter]] = {step.name: step for step in (Normals, Interior, Thin, Sculpt, Reconstruct)}
 """The steps that a file may name."""
 
 

@@ -15,24 +15,13 @@ from face_plugin.cloud import as_points
 from face_plugin.estimate import solve
 from face_plugin.execution import Execution
 from face_plugin.params import Params
+from face_plugin.result import Mesh
 from face_plugin.sides.sensors import Sensors
 from face_plugin.solver import FaCE
 from face_plugin.stages import Progress
 from face_plugin.tiles import Tiled
 
-__all__ = ["Mesh", "PointSet"]
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """A reconstructed surface."""
-
-    vertices: NDArray[np.float64]
-    """(k, 3) in the unit of the points."""
-    faces: NDArray[np.int64]
-    """(f, 3) oriented outward."""
-    densities: NDArray[np.float64] | None = None
-    """(k,) sampling density at the vertices, where the host gives it."""
+__all__ = ["PointSet"]
 
 
 @dataclass(frozen=True, eq=False)

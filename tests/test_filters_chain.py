@@ -7,7 +7,7 @@ import pytest
 
 from face_plugin import Execution, Params
 from face_plugin.errors import MeshingError
-from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
+from face_plugin.filters import Chain, Interior, Normals, PointSet, Reconstruct, Sculpt, Thin
 from face_plugin.filters.base import Filter
 
 CHAIN = Chain(
@@ -16,7 +16,7 @@ CHAIN = Chain(
         Sculpt("/edits/a b.json", Params(cage_spacing=0.0)),
         Normals(Params(cage_spacing=0.01, solid="icosahedron", alpha="dense"), execution=Execution(workers=3)),
         Interior("sparse"),
-        Surface(depth=9, screened=False, backend="pymeshlab"),
+        Reconstruct(depth=9, screened=False, backend="pymeshlab"),
     ]
 )
 
@@ -94,7 +94,7 @@ def test_other_extensions_are_refused(tmp_path):
 
 def test_errors_while_running_name_the_step_and_keep_their_kind():
     with pytest.raises(ValueError, match=r"step 2 \(surface\): a surface needs normals"):
-        Chain([Thin(0.1), Surface()])(PointSet(np.eye(3)))
+        Chain([Thin(0.1), Reconstruct()])(PointSet(np.eye(3)))
 
     class Failing(Filter):
         name = "failing"

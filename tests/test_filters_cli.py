@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from face_plugin.app.cli import main
-from face_plugin.filters import Chain, Interior, Normals, PointSet, Surface, Thin
+from face_plugin.filters import Chain, Interior, Normals, PointSet, Reconstruct, Thin
 from face_plugin.io import CloudFile, read_cloud, write_cloud
 from face_plugin.shapes import nested_box
 
@@ -39,7 +39,7 @@ def test_a_chain_of_points(files, capsys):
 
 
 def test_a_chain_that_ends_with_a_surface(files, capsys):
-    chain = Chain([Normals(), Interior(), Surface(depth=5)])
+    chain = Chain([Normals(), Interior(), Reconstruct(depth=5)])
     assert face_chain(files, chain, "out.obj") == 0
     surface = chain(PointSet(SHAPE.points)).surface
     assert np.allclose(read_cloud(files / "out.obj").points, surface.vertices)
@@ -49,8 +49,8 @@ def test_a_chain_that_ends_with_a_surface(files, capsys):
 @pytest.mark.parametrize(
     ("chain", "output", "message"),
     [
-        (Chain([Normals(), Surface()]), "out.las", "extension '.las'"),
-        (Chain([Surface()]), "out.ply", "step 1 (surface): a surface needs normals"),
+        (Chain([Normals(), Reconstruct()]), "out.las", "extension '.las'"),
+        (Chain([Reconstruct()]), "out.ply", "step 1 (surface): a surface needs normals"),
     ],
 )
 def test_mistakes(files, capsys, chain, output, message):

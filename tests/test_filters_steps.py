@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from face_plugin import Execution, Params, estimate_normals, reconstruct
-from face_plugin.filters import Chain, Interior, Normals, PointSet, Sculpt, Surface, Thin
+from face_plugin import Execution, Params, estimate_normals, filters, reconstruct
+from face_plugin.filters import Chain, Interior, Normals, PointSet, Reconstruct, Sculpt, Thin
 from face_plugin.sculpt import SculptFile
 from face_plugin.shapes import nested_box, spherical_shell, torus
 
@@ -58,7 +58,7 @@ def test_another_alpha_needs_no_other_solve(shape):
 
 def test_a_chain_is_the_reconstruction_of_the_array_call(shape):
     params = Params(alpha=0.02)
-    layer = Chain([Normals(params), Interior(), Surface(depth=5)])(PointSet(shape.points))
+    layer = Chain([Normals(params), Interior(), Reconstruct(depth=5)])(PointSet(shape.points))
     surface = reconstruct(shape.points, params, depth=5)
     assert np.array_equal(layer.surface.vertices, surface.vertices)
     assert np.array_equal(layer.surface.faces, surface.faces)
@@ -150,15 +150,25 @@ def test_a_sculpt_needs_a_file():
 
 def test_a_surface_without_normals_or_points_says_so(ring):
     with pytest.raises(ValueError, match="a surface needs normals"):
-        Surface()(PointSet(ring.points))
+        Reconstruct()(PointSet(ring.points))
     with pytest.raises(ValueError, match="none of the 700 are kept"):
-        Surface()(PointSet(ring.points, ring.normals, np.zeros(700, dtype=bool)))
+        Reconstruct()(PointSet(ring.points, ring.normals, np.zeros(700, dtype=bool)))
 
 
 def test_strays_are_of_no_surface_without_the_interior_step_either(ring):
     points = np.concatenate([ring.points, [[9.0, 0.0, 0.0]]])
-    layer = Chain([Normals(), Surface(depth=5)])(PointSet(points))
+    layer = Chain([Normals(), Reconstruct(depth=5)])(PointSet(points))
     assert layer.keep.all()
     expected = reconstruct(points, depth=5, filter_interior=False)
     assert np.array_equal(layer.surface.vertices, expected.vertices)
     assert np.abs(layer.surface.vertices).max() < 5
+
+
+def test_the_old_name_of_the_reconstruction_warns_and_works():
+    with pytest.warns(DeprecationWarning, match="filters.Surface is now .*Reconstruct$"):
+        old = filters.Surface
+    assert old is Reconstruct
+    assert Reconstruct.name == "surface"
+    assert Chain.from_dict({"steps": [{"filter": "surface", "depth": 6}]}).steps == (Reconstruct(6),)
+    with pytest.raises(AttributeError, match="no attribute 'Surfaces'"):
+        filters.Surfaces  # noqa: B018

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from face_plugin.adapters.open3d.cloud import is_tensor, layer_of
 from face_plugin.errors import require
 from face_plugin.execution import Execution
-from face_plugin.filters import Chain, Filter, Interior, Normals, Surface
+from face_plugin.filters import Chain, Filter, Interior, Normals, Reconstruct
 from face_plugin.params import Params
 from face_plugin.sides.sensors import sensors_of
 
@@ -62,7 +62,7 @@ def create_from_point_cloud_face(
     """
     o3d = require("open3d", extra="open3d")
     middle: list[Filter] = [Interior()] if filter_interior else []
-    chain = Chain([Normals(params, execution=execution), *middle, Surface(depth, screened, "open3d", trim)])
+    chain = Chain([Normals(params, execution=execution), *middle, Reconstruct(depth, screened, "open3d", trim)])
     settings = {"params": params, "execution": execution}
     layer = chain(layer_of(pcd, sculpt, sensors_of(viewpoints, seen_from, up), settings))
     surface = layer.surface

@@ -9,7 +9,7 @@ from typing import Any
 
 from face_plugin.adapters.pymeshlab import layer as layers
 from face_plugin.adapters.pymeshlab.parameters import Parameter, common_parameters, settings_in
-from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Surface
+from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Reconstruct
 
 __all__ = ["FILTERS", "MeshLabFilter", "Values", "python_name"]
 
@@ -50,7 +50,7 @@ def _strength(ms: Any, layer: PointSet, values: Values) -> None:
 
 def _surface(ms: Any, layer: PointSet, values: Values) -> None:
     middle: list[Filter] = [Interior()] if values["filter_interior"] else []
-    last = Surface(values["depth"], values["screened"], "pymeshlab")
+    last = Reconstruct(values["depth"], values["screened"], "pymeshlab")
     surface = Chain([Normals(**settings_in(values)), *middle, last])(layer).surface
     assert surface is not None  # the chain ends with it
     layers.add_surface(ms, surface.vertices, surface.faces, "Faraday mesh")

@@ -39,11 +39,11 @@ def register(commands: Any) -> None:
 
 def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str]:
     """Run the chain and write what it leaves."""
-    from face_plugin.filters import Chain, Normals, PointSet, Surface
+    from face_plugin.filters import Chain, Normals, PointSet, Reconstruct
     from face_plugin.sides.sensors import sensors_of
 
     chain = Chain.load(args.input)
-    meshed = any(isinstance(step, Surface) for step in chain.steps)
+    meshed = any(isinstance(step, Reconstruct) for step in chain.steps)
     output = check_output(args.output, MESH_SUFFIXES if meshed else CLOUD_SUFFIXES)
     with console.stage("read"):
         cloud = read_cloud(args.cloud)

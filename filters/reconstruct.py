@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from face_plugin.filters.base import Filter
-from face_plugin.filters.pointset import Mesh, PointSet
+from face_plugin.filters.pointset import PointSet
+from face_plugin.result import Mesh
 from face_plugin.stages import Progress
 from face_plugin.surface import Backend, poisson_reconstruction
 
-__all__ = ["Surface"]
+__all__ = ["Reconstruct"]
 
 
 @dataclass(frozen=True)
-class Surface(Filter):
+class Reconstruct(Filter):
     """Reconstruct the surface of the kept points but strays from their normals, by a host's Poisson reconstruction.
 
     Parameters
@@ -27,7 +28,7 @@ class Surface(Filter):
     >>> from face_plugin.filters import PointSet
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(300)
-    >>> Surface(depth=4)(PointSet(ball.points, ball.normals)).surface.faces.shape[1]
+    >>> Reconstruct(depth=4)(PointSet(ball.points, ball.normals)).surface.faces.shape[1]
     3
     """
 

@@ -178,12 +178,13 @@ def refine(
     turned = turn_angles(around, side, plate, still)
     refined = turned.normals
 
-    # 3. Borders: where a sheet ends in the open, the field has a say in the angle as well.
-    if sights is None:
+    # 3. Borders: where the sheet of a body ends in the open, the field has a say in the angle as well. What encloses
+    # nothing goes on as it is.
+    if sights is None and not is_open(field.difference):
         refined = bend_borders(points, refined, field.votes, field.strength, neighbour)
 
     # 4. Level: the surface that the normals describe together is made to pass through the points.
-    weight = level_weight(around.distance, neighbour, 1.0 - turned.resolved, turned.residual)
+    weight = level_weight(around.distance, neighbour, turned.error)
     refined = level(around.tree, refined, neighbour, turned.width, weight)
     if sights is not None:
         # The angle is known better now, and so is which side of it was seen.

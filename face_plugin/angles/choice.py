@@ -9,7 +9,7 @@ from face_plugin.angles.fits import ROOT, SAME_SIDE, LocalFits
 from face_plugin.compiled import compiled
 from face_plugin.threads import in_threads
 
-__all__ = ["FLATNESS", "combine_fits"]
+__all__ = ["FLATNESS", "LEAST", "combine_fits"]
 
 # Fits of this many nearest points are looked at, the point's own among them: near an edge, those a little way into the
 # face that the point lies on do not see the edge.
@@ -28,11 +28,16 @@ FLATNESS = 0.01
 OFF = 2.0
 # Least squared error of a normal, in squared radians: below, errors are as good as none.
 LEAST = 1e-9
+# Fits that claim to know better than they agree: where the mean of their unit normals is shorter than 1 by this much
+# (26 degrees to either side), it counts no more than the direction that the side was found in. So a point on a sharp
+# edge lies between its faces, and not on one of them by chance.
+APART = 0.1
 
 
 def combine_fits(
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
+    side: NDArray[np.float64],
     neighbour: NDArray[np.intp],
     fits: LocalFits,
     noise: NDArray[np.float64],
@@ -45,10 +50,16 @@ def combine_fits(
     around a neighbour farther from the edge has less of the second, and is as good for every point that it contains.
     Fits around neighbours also pay for what the noise may hide from them.
 
+    What each fit cannot know is that it lies on another face than the point. That shows where they contradict one
+    another: with the length R of the mean of their unit normals, the mean and `side` are added in the proportion
+    APART^2 to (1 - R)^2.
+
     Parameters
     ----------
     points, normals : (n, 3) float64
         Unit normals, the same that were fitted with.
+    side : (n, 3) float64
+        Unit normals of the right side, smooth across edges.
     neighbour : (n, k) intp
         Nearest points, ascending, the point itself first.
     fits : LocalFits
@@ -71,7 +82,7 @@ def combine_fits(
     >>> slopes = np.stack([np.sign(x - 4.9), 0 * x, 1 + 0 * x], axis=1) / np.sqrt(2)
     >>> near = cKDTree(roof).query(roof, k=97)[1]
     >>> up = np.tile([0.0, 0, 1], (400, 1))
-    >>> found, _ = combine_fits(roof, up, near, fit_surfaces(roof, up, near), np.zeros(400))
+    >>> found, _ = combine_fits(roof, up, up, near, fit_surfaces(roof, up, near), np.zeros(400))
     >>> bool(((found * slopes).sum(axis=1) > 0.99).mean() > 0.9)
     True
     """
@@ -79,15 +90,11 @@ def combine_fits(
     found, error = np.array(normals, dtype=np.float64), np.full(n, np.inf)
     if len(fits.reach):
         around = np.ascontiguousarray(neighbour[:, :AROUND])
-        points, normals, noise = (
-            np.ascontiguousarray(points),
-            np.ascontiguousarray(normals),
-            np.ascontiguousarray(noise),
-        )
+        points, normals, side, noise = (np.ascontiguousarray(array) for array in (points, normals, side, noise))
 
         def run(rows: slice) -> None:
             _combine(
-                rows.start, rows.stop, points, normals, noise, around, fits.frame, fits.plane, fits.quadric,
+                rows.start, rows.stop, points, normals, side, noise, around, fits.frame, fits.plane, fits.quadric,
                 fits.variance, fits.gain, fits.reach, fits.used, found, error,
             )  # fmt: skip
 
@@ -97,11 +104,11 @@ def combine_fits(
 
 @compiled(nogil=True)
 def _combine(  # type: ignore[no-untyped-def]
-    first, last, points, normals, noise, around, frame, plane, quadric, variance, gain, reach, used, found, error
+    first, last, points, normals, side, noise, around, frame, plane, quadric, variance, gain, reach, used, found, error
 ):
     for i in range(first, last):
         n0, n1, n2 = normals[i, 0], normals[i, 1], normals[i, 2]
-        sum0, sum1, sum2 = 0.0, 0.0, 0.0
+        sum0, sum1, sum2, total = 0.0, 0.0, 0.0, 0.0
         sigma = noise[i]
         for t in range(around.shape[1]):
             j = around[i, t]
@@ -148,6 +155,14 @@ def _combine(  # type: ignore[no-untyped-def]
                     sum0 += weight * (frame[j, 2, 0] - slope_u * frame[j, 0, 0] - slope_v * frame[j, 1, 0])
                     sum1 += weight * (frame[j, 2, 1] - slope_u * frame[j, 0, 1] - slope_v * frame[j, 1, 1])
                     sum2 += weight * (frame[j, 2, 2] - slope_u * frame[j, 0, 2] - slope_v * frame[j, 1, 2])
+                    total += 1.0 / wrong
         length = np.sqrt(sum0 * sum0 + sum1 * sum1 + sum2 * sum2)
         if length > 0.0:
+            known, doubted = APART * APART / length, (1.0 - length / total) ** 2
+            sum0, sum1, sum2 = (
+                known * sum0 + doubted * side[i, 0],
+                known * sum1 + doubted * side[i, 1],
+                known * sum2 + doubted * side[i, 2],
+            )
+            length = np.sqrt(sum0 * sum0 + sum1 * sum1 + sum2 * sum2)
             found[i, 0], found[i, 1], found[i, 2] = sum0 / length, sum1 / length, sum2 / length

@@ -20,46 +20,39 @@ AREA = 0.87
 # A point off the level by more than FARTHEST is no sample of one surface, and by more than FAR is as one off by FAR.
 FAR = 0.25
 FARTHEST = 0.35
-# Weights fall from 1 to 0 (or rise from 0 to 1) between these. Mean scatter among the 96 nearest: a scattered position
-# is no reason to turn a normal. Nearest distance in spacings, mean of the 24 nearest: without an even sampling the
-# areas are not known. Residual of the quadric, in spacings: flat surfaces are level. Level itself, median of the 24
-# nearest: off where other parts cut in.
-SCATTERED = (0.05, 0.2)
+# Weights rise from 0 to 1 (or fall from 1 to 0) between these. Nearest distance in spacings, mean of the 24 nearest:
+# without an even sampling the areas are not known. Level itself, median of the 24 nearest: off where other parts cut in.
 EVEN = (0.65, 0.72)
-CURVED = (0.03, 0.07)
 LEVEL = (0.12, 0.18)
+# Squared error of what positions say of a normal (4 degrees), in squared radians.
+POSITIONS = np.radians(4.0) ** 2
 AROUND = 24
 
 
 def level_weight(
-    distance: NDArray[np.float64],
-    neighbour: NDArray[np.intp],
-    scatter: NDArray[np.float64],
-    residual: NDArray[np.float64],
+    distance: NDArray[np.float64], neighbour: NDArray[np.intp], error: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """How far (n,) the positions can be trusted to say anything of the normals, in [0, 1].
+    """How far (n,) the positions say more of the normals than is known already, in [0, 1].
 
     Parameters
     ----------
     distance, neighbour : (n, k) float64, (n, k) intp
         Of the nearest points, ascending, the point itself first; k > 6.
-    scatter : (n,) float64
-        How much the points scatter about their surface, in [0, 1].
-    residual : (n,) float64
-        Of the smallest quadric fits, in spacings.
+    error : (n,) float64
+        Expected squared error of the normals, in squared radians: small where fits tell them, as where points scatter
+        about a flat sheet.
 
     Examples
     --------
     >>> from scipy.spatial import cKDTree
     >>> from face_plugin.shapes import sphere
     >>> found = cKDTree(ball := sphere(500).points).query(ball, k=97)
-    >>> bool(level_weight(*found, np.zeros(500), np.full(500, 0.1)).min() > 0.5)
+    >>> bool(level_weight(*found, np.full(500, 0.1)).min() > 0.5)
     True
     """
     evenness = distance[:, 1] / distance[:, 1:7].mean(axis=1)
-    clear = 1.0 - ramp(scatter[neighbour].mean(axis=1), SCATTERED)
     even = ramp(evenness[neighbour[:, : AROUND + 1]].mean(axis=1), EVEN)
-    return np.asarray(clear * even * ramp(residual, CURVED))
+    return np.asarray(even * error / (error + POSITIONS))
 
 
 def level(

@@ -69,7 +69,7 @@ def on_lattice(points: NDArray[np.float64], neighbour: NDArray[np.intp]) -> bool
     Examples
     --------
     >>> from scipy.spatial import cKDTree
-    >>> points = np.random.default_rng(0).uniform(0, 20, (400, 3))
+    >>> points = np.random.default_rng(0).uniform(0, 20, (2000, 3))
     >>> rounded = np.unique(points.round(), axis=0)
     >>> [on_lattice(p, cKDTree(p).query(p, k=2)[1]) for p in (points, rounded)]
     [False, True]

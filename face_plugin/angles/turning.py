@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.angles.choice import FLATNESS, combine_fits
+from face_plugin.angles.choice import FLATNESS, LEAST, combine_fits
 from face_plugin.angles.fits import LocalFits, fit_surfaces
-from face_plugin.angles.noise import find_noise
+from face_plugin.angles.noise import find_noise, medians
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 
@@ -36,13 +36,10 @@ class Turned:
 
     normals: NDArray[np.float64]
     """(n, 3) unit normals."""
-    resolved: NDArray[np.float64]
-    """(n,) the narrow kernel's part in them, in [0, 1]: 1 where every point tells something new of the surface, 0 where
-    it is flat or the points scatter about it."""
+    error: NDArray[np.float64]
+    """(n,) expected squared error, in squared radians: large where every point tells something new of the surface."""
     width: NDArray[np.float64]
     """(n,) of the kernel at each point; 0 where it had no part."""
-    residual: NDArray[np.float64]
-    """(n,) root mean square height of points about the smallest quadrics, in spacings."""
 
 
 def turn_angles(
@@ -81,11 +78,11 @@ def turn_angles(
     for steps in STEPS:
         fits = fit_surfaces(around.points, normals, around.neighbour)
         noise, least = find_noise(around.points, fits, around.neighbour)
-        line, error = combine_fits(around.points, normals, around.neighbour, fits, noise)
+        line, error = combine_fits(around.points, normals, side, around.neighbour, fits, noise)
         fitted = np.where(still[:, None], side, _along(line, side))
-        kernel_error = _kernel_error(fits, noise, least, spacing)
         # Each by the inverse of its expected squared error.
-        part = np.where(np.isfinite(error), 1.0 / (1.0 + kernel_error / np.where(np.isfinite(error), error, 1.0)), 1.0)
+        of_fits, of_kernel = 1.0 / error, 1.0 / _kernel_error(around, fits, noise, least)
+        part = of_kernel / (of_fits + of_kernel)
         part[plate | still | (part < LEAST_PART)] = 0.0
         width = np.where(part > 0.0, wide, 0.0)
         normals = fitted
@@ -93,22 +90,24 @@ def turn_angles(
             narrow = unit(around.tree.outward(normals, width))
             normals = unit(part[:, None] * narrow + (1.0 - part)[:, None] * fitted)
         normals = np.where(still[:, None], side, _along(normals, side))
-    return Turned(normals, part, width, np.sqrt(least) / spacing)
+    return Turned(normals, 1.0 / (of_fits + of_kernel), width)
 
 
 def _kernel_error(
-    fits: LocalFits, noise: NDArray[np.float64], least: NDArray[np.float64], spacing: NDArray[np.float64]
+    around: Neighbourhood, fits: LocalFits, noise: NDArray[np.float64], least: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Guess the squared error (n,) of the kernel's normals, in squared radians; infinite where nothing is fitted.
+    """Guess the squared error (n,) of the kernel's normals, in squared radians.
 
     The kernel sees the nearest points alone: it follows what the smallest fit smooths over, and all of the noise. Where
     the nearest points lie on a line, as along a row of a scan, the gain of the smallest fit is as large as the kernel
-    is wrong.
+    is wrong; on sharp edges, where nothing is fitted, that of the neighbours' stands for it.
     """
     if len(fits.reach) == 0:
-        return np.zeros(len(spacing))
-    rough = (ROUGH / spacing) ** 2 * (least - noise)
-    return np.asarray(rough + NOISY * fits.gain[0, :, 1] * (noise + (FLATNESS * fits.reach[0]) ** 2))
+        return np.full(len(around), LEAST)
+    gain = fits.gain[0, :, 1]
+    gain = np.where(np.isfinite(gain), gain, medians(gain, around.neighbour))
+    rough = (ROUGH / around.spacing) ** 2 * (least - noise)
+    return np.clip(rough + NOISY * gain * (noise + (FLATNESS * fits.reach[0]) ** 2), LEAST, np.pi**2)
 
 
 def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:

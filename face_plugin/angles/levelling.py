@@ -21,7 +21,7 @@ AREA = 0.87
 FAR = 0.25
 FARTHEST = 0.35
 # Weights rise from 0 to 1 (or fall from 1 to 0) between these. Nearest distance in spacings, mean of the 24 nearest:
-# without an even sampling the areas are not known. Level itself, median of the 24 nearest: off where other parts cut in.
+# without an even sampling the areas are not known. Level itself, median of the 24 nearest: off where others cut in.
 EVEN = (0.65, 0.72)
 LEVEL = (0.12, 0.18)
 # Squared error of what positions say of a normal (4 degrees), in squared radians.

@@ -107,7 +107,8 @@ def _kernel_error(
     gain = fits.gain[0, :, 1]
     gain = np.where(np.isfinite(gain), gain, medians(gain, around.neighbour))
     rough = (ROUGH / around.spacing) ** 2 * (least - noise)
-    return np.clip(rough + NOISY * gain * (noise + (FLATNESS * fits.reach[0]) ** 2), LEAST, np.pi**2)
+    chance = NOISY * gain * (noise + (FLATNESS * fits.reach[0]) ** 2)
+    return np.asarray(np.clip(rough + chance, LEAST, np.pi**2))
 
 
 def _along(lines: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:

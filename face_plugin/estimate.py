@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,7 @@ from face_plugin.stages import Progress
 from face_plugin.surface import Backend, check_arguments, poisson_reconstruction
 from face_plugin.tiles.plan import check_one_piece, in_tiles
 from face_plugin.tiles.tiled import Tiled
+from face_plugin.trimming import TrimDistance
 
 __all__ = ["estimate_normals", "orient_normals", "reconstruct", "solve", "solve_whole"]
 
@@ -226,12 +228,13 @@ def reconstruct(
     up: ArrayLike | None = None,
     backend: Backend | None = None,
     trim: float = 0.0,
+    trim_distance: TrimDistance = "auto",
     sculpt: SculptFile | str | os.PathLike[str] | None = None,
     execution: Execution | None = None,
     engine: EngineLike | None = None,
     progress: Progress | None = None,
 ) -> Surface:
-    """Reconstruct a closed surface: outward normals, interior points dropped, Poisson reconstruction.
+    """Reconstruct a surface, closed where the scan is: outward normals, no interior points, Poisson reconstruction.
 
     Parameters
     ----------
@@ -247,6 +250,10 @@ def reconstruct(
         Host that reconstructs; by default whichever is installed.
     trim : float
         Fraction of the vertices to drop, those of lowest density. This opens the surface.
+    trim_distance : float, "auto" or None
+        Cut the surface where it is farther than this from the points that it was made from, in spacings: mean distances
+        of a point to its 6 nearest others. "auto": 2 where the scan is open (`Result.open`), and closed bodies stay
+        whole. None: nothing is cut, and what was not scanned is closed by a dome.
 
     Returns
     -------
@@ -259,7 +266,7 @@ def reconstruct(
     >>> surface.faces.shape[1]
     3
     """
-    backend = check_arguments(depth, backend, trim)
+    backend = check_arguments(depth, backend, trim, trim_distance)
     params, execution = settled(params, execution, engine)
     result = estimate_normals(
         points,
@@ -277,8 +284,9 @@ def reconstruct(
     report = progress or (lambda stage, fraction: None)
     report("surface", 0.0)
     start = time.perf_counter()
+    given: dict[str, Any] = {"depth": depth, "screened": screened, "backend": backend, "open_at": result.open[keep]}
     vertices, faces, densities = poisson_reconstruction(
-        array[keep], result.normals[keep], depth=depth, screened=screened, backend=backend, trim=trim
+        array[keep], result.normals[keep], trim=trim, trim_distance=trim_distance, **given
     )
     timings = {**result.timings, "surface": time.perf_counter() - start}
     report("surface", 1.0)

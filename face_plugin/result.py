@@ -41,6 +41,9 @@ class Result:
     strays: NDArray[np.bool_]
     """(n,) whether the point lies too far from everything to belong to a surface; its confidence is 0, and its normal
     that of the nearest point that is none."""
+    open: NDArray[np.bool_]
+    """(n,) whether the point is of an open part of the cloud, one that encloses nothing, such as a floor: the field is
+    alike on both of its sides. Connected points have the same value."""
 
     @property
     def kept(self) -> NDArray[np.bool_]:

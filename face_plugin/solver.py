@@ -25,6 +25,7 @@ from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.given import checked_trust, given_lines, sides_of_lines
+from face_plugin.sides.parts import open_parts, parts
 from face_plugin.sides.sensors import Sensors, sights
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.strays import find_strays, without
@@ -74,6 +75,11 @@ class Reading:
     def confidence(self) -> NDArray[np.float64]:
         """Confidence (m,) in the side of the normals."""
         return confidence(self.around, witness(self.seen.votes, self.sights), self.normals)
+
+    @cached_property
+    def open(self) -> NDArray[np.bool_]:
+        """Which distinct points (m,) are of parts that enclose nothing."""
+        return open_parts(parts(self.around, self.normals), self.seen)
 
     def threshold(self, alpha: float | str) -> float:
         """Alpha as a number, which "auto" derives from the leak of the cage."""
@@ -224,6 +230,11 @@ class FaCE(Sculptable):
         alpha = Params(alpha=self.params.alpha if alpha is None else alpha).alpha  # type: ignore[arg-type]
         return self._reading.interior(alpha)[self.cloud.rows] & ~self.strays
 
+    @property
+    def open(self) -> NDArray[np.bool_]:
+        """Which input points (n,) are of parts that enclose nothing, as `Result.open` has it."""
+        return self._reading.open[self.cloud.rows]
+
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
         dtype, rows = self.cloud.dtype, self.cloud.rows
@@ -236,6 +247,7 @@ class FaCE(Sculptable):
             strength=self._reading.seen.strength[rows].astype(dtype),
             confidence=np.where(self.strays, 0.0, self._reading.confidence[rows]).astype(dtype),
             strays=self.strays,
+            open=self.open,
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=params,

@@ -15,6 +15,7 @@ from face_plugin.cloud import as_points
 from face_plugin.errors import FaceError, MissingDependencyError, require
 from face_plugin.memory import GIGABYTE, available_memory
 from face_plugin.threads import KDTree
+from face_plugin.trimming import Arrays, TrimDistance, check_distance, trimmed, where_to_cut
 
 __all__ = [
     "Backend",
@@ -55,8 +56,6 @@ _BITS = 20
 # The hosts share state within a process: several reconstructions at once crash, PyMeshLab's more often than Open3D's.
 _one_at_a_time = threading.Lock()
 
-Arrays = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]
-
 
 def poisson_reconstruction(
     points: NDArray[np.floating],
@@ -66,6 +65,8 @@ def poisson_reconstruction(
     screened: bool = True,
     backend: Backend | None = None,
     trim: float = 0.0,
+    trim_distance: TrimDistance = "auto",
+    open_at: NDArray[np.bool_] | None = None,
 ) -> Arrays:
     """Reconstruct a surface from oriented points (Kazhdan et al. 2006; screened: Kazhdan and Hoppe 2013).
 
@@ -82,6 +83,11 @@ def poisson_reconstruction(
     trim : float, fraction in [0, 1)
         Drop the vertices whose sampling density is in this lowest fraction (Open3D only). This opens the
         surface.
+    trim_distance : float > 0, "auto" or None
+        Cut the surface where it is more than so many spacings from the points, or cells of the octree where these are
+        wider. "auto": 2 around the points of `open_at`, and no cut around others. None: no cut.
+    open_at : (n,) bool, optional
+        Which points are part of an open surface, as `Result.open` has it.
 
     Returns
     -------
@@ -108,7 +114,7 @@ def poisson_reconstruction(
     >>> vertices.shape[1], faces.shape[1]
     (3, 3)
     """
-    backend = check_arguments(depth, backend, trim)
+    backend = check_arguments(depth, backend, trim, trim_distance)
     points, normals = as_points(points), as_points(normals, "normals")
     if len(normals) != len(points):
         raise ValueError(f"normals must be as many as points, found {len(normals)} for {len(points)}")
@@ -124,19 +130,23 @@ def poisson_reconstruction(
         depth = suggested_depth(local)
     warn_if_too_large(local, depth)
     run = _open3d if backend == "open3d" else _pymeshlab
-    vertices, faces, densities = _closed(run, local, normals.astype(np.float64), int(depth), SCREENING * screened)
-    if trim > 0 and densities is not None and len(densities):
-        vertices, faces, densities = _trimmed(vertices, faces, densities, trim)
+    cut_at = where_to_cut(len(local), trim_distance, open_at)
+    # What is cut all around need not be closed before.
+    scales = SCALES[:1] if cut_at.all() else SCALES
+    made = _closed(run, local, normals.astype(np.float64), int(depth), SCREENING * screened, scales)
+    vertices, faces, densities = trimmed(made, local, trim, trim_distance, cut_at, SCALES[0] / 2**depth)
     if len(faces) < FEWEST_FACES:
-        less = f", less trim than {trim:g}" if trim > 0 else ""
+        less = (f", less trim than {trim:g}" if trim > 0 else "") + (", a larger trim_distance" if cut_at.any() else "")
+        found = f"{len(faces)} triangles from {len(points)} points"
         raise FaceError(
-            f"the surface is empty: try a deeper octree than depth={depth}{less} or more points; found {len(faces)} "
-            f"triangles from {len(points)} points"
+            f"the surface is empty: try a deeper octree than depth={depth}{less} or more points; found {found}"
         )
     return vertices * size + origin, faces, densities
 
 
-def check_arguments(depth: int | None, backend: Backend | None, trim: float) -> Backend:
+def check_arguments(
+    depth: int | None, backend: Backend | None, trim: float, trim_distance: TrimDistance = None
+) -> Backend:
     """Check the arguments of `poisson_reconstruction`, which come late; return the backend that will run.
 
     Examples
@@ -149,6 +159,7 @@ def check_arguments(depth: int | None, backend: Backend | None, trim: float) -> 
         raise ValueError(f"depth must be an integer from {DEPTHS[0]} to {DEPTHS[1]}, found {depth!r}")
     if not isinstance(trim, (int, float, np.number)) or not 0.0 <= trim < 1.0:
         raise ValueError(f"trim must be in [0, 1), found {trim!r}")
+    check_distance(trim_distance)
     if backend is None:
         backend = _installed()
     if backend not in BACKENDS:
@@ -171,7 +182,12 @@ def _installed() -> Backend:
 
 
 def _closed(
-    run: Callable[..., Arrays], points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float
+    run: Callable[..., Arrays],
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    depth: int,
+    weight: float,
+    scales: tuple[float, ...],
 ) -> Arrays:
     """Reconstruct in the smallest cube in which the surface is closed: over a wide gap it bulges beyond the points.
 
@@ -182,12 +198,12 @@ def _closed(
         with _one_at_a_time:
             return run(points, normals, depth, weight, scale)
 
-    made = [made_in(SCALES[0])]
-    for scale in SCALES[1:]:
+    made = [made_in(scales[0])]
+    for scale in scales[1:]:
         if is_closed(made[-1][1]):
             return made[-1]
         made.append(made_in(scale))
-    return made[-1] if is_closed(made[-1][1]) else made[0]
+    return made[-1] if len(made) > 1 and is_closed(made[-1][1]) else made[0]
 
 
 def is_closed(faces: NDArray[np.integer]) -> bool:
@@ -227,16 +243,6 @@ def _pymeshlab(
     )
     mesh = meshes.current_mesh()
     return mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64), None
-
-
-def _trimmed(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], densities: NDArray[np.float64], trim: float
-) -> Arrays:
-    keep = densities >= np.quantile(densities, trim)
-    faces = faces[keep[faces].all(axis=1)]
-    used = np.zeros(len(vertices), dtype=np.bool_)
-    used[faces] = True
-    return vertices[used], (np.cumsum(used) - 1)[faces], densities[used]
 
 
 def suggested_depth(points: NDArray[np.floating]) -> int:

@@ -84,5 +84,6 @@ class Normals(Filter):
             **layer.attributes,
             "strength": layer.scatter(result.strength),
             "confidence": layer.scatter(result.confidence),
+            "open": layer.scatter(result.open),
         }
         return layer.replace(normals=layer.scatter(result.normals), attributes=attributes, cage=cage)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
+
+import numpy as np
 
 from face_plugin.filters.base import Filter
 from face_plugin.filters.pointset import PointSet
 from face_plugin.result import Mesh
 from face_plugin.stages import Progress
 from face_plugin.surface import Backend, poisson_reconstruction
+from face_plugin.trimming import TrimDistance
 
 __all__ = ["Reconstruct"]
 
@@ -20,8 +23,9 @@ class Reconstruct(Filter):
 
     Parameters
     ----------
-    depth, screened, backend, trim
-        As in `face_plugin.reconstruct`.
+    depth, screened, backend, trim, trim_distance
+        As in `face_plugin.reconstruct`; which points are open the attribute ``open`` tells, where a 'normals' step left
+        it. None is "none" in a file.
 
     Examples
     --------
@@ -37,6 +41,11 @@ class Reconstruct(Filter):
     screened: bool = True
     backend: Backend | None = None
     trim: float = 0.0
+    trim_distance: TrimDistance | Literal["none"] = "auto"
+
+    def __post_init__(self) -> None:
+        if self.trim_distance is None:
+            object.__setattr__(self, "trim_distance", "none")
 
     def __call__(self, layer: PointSet, *, progress: Progress | None = None) -> PointSet:
         """Return `layer` with its ``surface``.
@@ -54,6 +63,7 @@ class Reconstruct(Filter):
             raise ValueError(f"a surface needs points, and none of the {len(layer)} are kept")
         # Strays are of no surface, also where no interior step left them out.
         keep = layer.keep if layer.cage is None else layer.keep & ~layer.scatter(layer.cage.strays)
+        opened = layer.attributes.get("open")
         if progress is not None:
             progress("surface", 0.0)
         vertices, faces, densities = poisson_reconstruction(
@@ -63,6 +73,8 @@ class Reconstruct(Filter):
             screened=self.screened,
             backend=self.backend,
             trim=self.trim,
+            trim_distance=None if self.trim_distance == "none" else self.trim_distance,
+            open_at=opened[keep] if opened is not None and opened.dtype == np.bool_ else None,
         )
         if progress is not None:
             progress("surface", 1.0)

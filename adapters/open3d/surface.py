@@ -15,6 +15,7 @@ from face_plugin.execution import Execution
 from face_plugin.filters import Chain, Filter, Interior, Normals, Reconstruct
 from face_plugin.params import Params
 from face_plugin.sides.sensors import sensors_of
+from face_plugin.trimming import TrimDistance
 
 __all__ = ["create_from_point_cloud_face"]
 
@@ -26,6 +27,7 @@ def create_from_point_cloud_face(
     screened: bool = True,
     filter_interior: bool = True,
     trim: float = 0.0,
+    trim_distance: TrimDistance = "auto",
     viewpoints: ArrayLike | None = None,
     seen_from: ArrayLike | None = None,
     up: ArrayLike | None = None,
@@ -39,7 +41,7 @@ def create_from_point_cloud_face(
     ----------
     pcd : open3d.geometry.PointCloud or open3d.t.geometry.PointCloud
         Stays as it is; normals that it has are not used.
-    depth, screened, filter_interior, trim, viewpoints, seen_from, up, params, execution
+    depth, screened, filter_interior, trim, trim_distance, viewpoints, seen_from, up, params, execution
         As in `face_plugin.reconstruct`.
     sculpt : path, optional
         File of charges and cage points, as of ``face mesh --sculpt``.
@@ -62,7 +64,8 @@ def create_from_point_cloud_face(
     """
     o3d = require("open3d", extra="open3d")
     middle: list[Filter] = [Interior()] if filter_interior else []
-    chain = Chain([Normals(params, execution=execution), *middle, Reconstruct(depth, screened, "open3d", trim)])
+    last = Reconstruct(depth, screened, "open3d", trim, trim_distance)
+    chain = Chain([Normals(params, execution=execution), *middle, last])
     settings = {"params": params, "execution": execution}
     layer = chain(layer_of(pcd, sculpt, sensors_of(viewpoints, seen_from, up), settings))
     surface = layer.surface

@@ -99,6 +99,8 @@ def generate_surface_reconstruction_faraday(ms: Any, **parameters: Any) -> None:
     ms : pymeshlab.MeshSet
     depth, screened, filter_interior
         As in `face_plugin.reconstruct`.
+    trim_distance : float
+        The same; 0 for "auto", -1 for None.
     alpha, cage_spacing, ...
         Settings of `face_plugin.Params` and `face_plugin.Execution`.
 

@@ -10,10 +10,12 @@ from typing import Any
 from face_plugin.adapters.pymeshlab import layer as layers
 from face_plugin.adapters.pymeshlab.parameters import Parameter, common_parameters, settings_in
 from face_plugin.filters import Chain, Filter, Interior, Normals, PointSet, Reconstruct
+from face_plugin.trimming import TrimDistance
 
 __all__ = ["FILTERS", "MeshLabFilter", "Values", "python_name"]
 
 Values = Mapping[str, Any]
+NO_TRIM = -1.0
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,11 @@ def _strength(ms: Any, layer: PointSet, values: Values) -> None:
 
 def _surface(ms: Any, layer: PointSet, values: Values) -> None:
     middle: list[Filter] = [Interior()] if values["filter_interior"] else []
-    last = Reconstruct(values["depth"], values["screened"], "pymeshlab")
+    # MeshLab's numbers cannot be a word or nothing.
+    distance: TrimDistance = values["trim_distance"] or "auto"
+    last = Reconstruct(
+        values["depth"], values["screened"], "pymeshlab", trim_distance=None if distance == NO_TRIM else distance
+    )
     surface = Chain([Normals(**settings_in(values)), *middle, last])(layer).surface
     assert surface is not None  # the chain ends with it
     layers.add_surface(ms, surface.vertices, surface.faces, "Faraday mesh")
@@ -74,6 +80,12 @@ _TABLE = (
             Parameter("depth", "int", 8, "Depth of the octree of the reconstruction"),
             Parameter("screened", "bool", True, "Screened reconstruction, or the smoother unscreened one"),
             Parameter("filter_interior", "bool", True, "Leave out the points inside the object"),
+            Parameter(
+                "trim_distance",
+                "float",
+                0.0,
+                "Spacings from the points beyond which the surface is cut; 0 = 2 where the scan is open; -1 = no cut",
+            ),
         ),
         transformed=True,
     ),

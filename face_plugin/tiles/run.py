@@ -21,6 +21,7 @@ from face_plugin.sides import enclosure
 from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Clock, Progress
 from face_plugin.tiles.coarse import Voxels, solve_coarse
+from face_plugin.tiles.parts import known_of
 from face_plugin.tiles.plan import make_engine, tile_size
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.scene import write_far
@@ -100,6 +101,7 @@ def estimate_tiled(
             timings={**timings, **tile_seconds(store)},
             params=params,
             strays=found["strays"],
+            open=found["open"],
         )
 
 
@@ -221,13 +223,14 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
     Returns
     -------
     dict of str to (n, ...) array
-        "normals", "strength", "confidence", "strays", and "interior" where the store asks for it.
+        "normals", "strength", "confidence", "strays", "open", and "interior" where the store asks for it.
     """
     kinds: dict[str, tuple[Any, tuple[int, ...]]] = {
         "normals": (store.dtype, (store.count, 3)),
         "strength": (store.dtype, (store.count,)),
         "confidence": (store.dtype, (store.count,)),
         "strays": (np.bool_, (store.count,)),
+        "open": (np.bool_, (store.count,)),
     }
     if store.interior:
         kinds["interior"] = (np.bool_, (store.count,))
@@ -241,6 +244,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
     out = {name: empty(name) for name in kinds}
     rows = store.rows()
     alpha = interior_alpha(store) if store.interior else 0.0
+    known = known_of(store)
     for tile in range(store.tiles):
         row = rows[store.start[tile] : store.start[tile + 1]]
         oriented = store.read(tile, "normals")
@@ -249,6 +253,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         out["confidence"][row] = oriented["confidence"]
         out["strength"][row] = solved["strength"]
         out["strays"][row] = solved["stray"]
+        out["open"][row] = known.open[known.nearest(store.tile_points(tile))]
         if store.interior:
             inside = solved["level"] < alpha
             out["interior"][row] = inside & oriented["enclosed"] if store.params.alpha == "auto" else inside

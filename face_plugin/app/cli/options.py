@@ -191,6 +191,20 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
         metavar="F",
         help="drop this fraction of the vertices, the least dense",
     )
+    group.add_argument(
+        "--trim-distance",
+        type=_distance,
+        default="auto",
+        metavar="X|auto|none",
+        help="cut the surface farther than X spacings from the points; auto = 2 where the scan is open [default: auto]",
+    )
+
+
+def _distance(text: str) -> float | str | None:
+    return None if text == "none" else text if text == "auto" else float(text)
+
+
+_distance.__name__ = "number, auto or none"
 
 
 def _depth(text: str) -> int | None:
@@ -205,4 +219,10 @@ def surface_of(args: argparse.Namespace) -> dict[str, Any]:
     if args.backend is not None:
         # Said now rather than after the computation.
         require(args.backend, extra=args.backend)
-    return {"depth": args.depth, "screened": not args.unscreened, "backend": args.backend, "trim": args.trim}
+    return {
+        "depth": args.depth,
+        "screened": not args.unscreened,
+        "backend": args.backend,
+        "trim": args.trim,
+        "trim_distance": args.trim_distance,
+    }

@@ -105,7 +105,8 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         meshes = []
         for keep in (slice(None), result.kept):
             with console.stage("surface"):
-                meshes.append(poisson_reconstruction(points[keep], result.normals[keep], **options)[:2])
+                given = points[keep], result.normals[keep]
+                meshes.append(poisson_reconstruction(*given, open_at=result.open[keep], **options)[:2])
         with console.stage("draw"):
             figure = plot.plot_interior(points, result.interior, *meshes, **looks)
         summary["dropped"] = int(result.interior.sum())

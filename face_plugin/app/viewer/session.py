@@ -217,8 +217,10 @@ class Session:
     def surface(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Vertices and triangles of the Poisson surface of the points that are not interior."""
         kept = ~self.interior()
-        normals = self.face.with_angles(self._angles).normals()
-        vertices, faces, _ = poisson_reconstruction(self.points[kept], normals[kept], depth=DEPTH)
+        refined = self.face.with_angles(self._angles)
+        vertices, faces, _ = poisson_reconstruction(
+            self.points[kept], refined.normals()[kept], depth=DEPTH, open_at=refined.open[kept]
+        )
         return vertices, faces
 
     def save_sculpt(self, path: str | os.PathLike[str]) -> None:

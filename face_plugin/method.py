@@ -26,7 +26,7 @@ from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.enclosure import DARK
-from face_plugin.sides.patches import turned_patches
+from face_plugin.sides.patches import Planes, planes_of, turned_patches
 from face_plugin.sides.sensors import resettled, sides_by_sensors
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.steps import turn_sides
@@ -169,9 +169,11 @@ def refine(
     plate = back_to_back(around, field.votes)
 
     # 1. Side.
-    side = blind = _sides_by_field(around, field, sheets or find_sheets(around), still, plate)
+    planes = planes_of(around)
+    side = blind = _sides_by_field(around, field, sheets or find_sheets(around), planes, still, plate)
     if sights is not None:
-        side = sides_by_sensors(around, sights, unit(blind))
+        side = sides_by_sensors(around, sights, unit(blind), planes)
+    del planes
 
     # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending
     # allows, and from a narrow kernel where the points only just resolve the surface.
@@ -196,6 +198,7 @@ def _sides_by_field(
     around: Neighbourhood,
     field: FieldAtPoints,
     sheets: Sheets,
+    planes: Planes,
     still: NDArray[np.bool_],
     plate: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
@@ -206,15 +209,15 @@ def _sides_by_field(
     # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
     # Of a cloud seen in part, what is sealed off is not judged by how it fits in: most of that is not there.
     reached = field.strength > DARK if still.any() else None
-    for by_sheets in (True, False, False):
+    for along in (planes, None, None):
         field_says = field.lean * np.einsum("nd,nd->n", votes, side)
-        turned = turned_patches(around, unit(side), field_says, by_sheets=by_sheets, reached=reached) & ~kept
+        turned = turned_patches(around, unit(side), field_says, planes=along, reached=reached) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
-        elif not by_sheets:
+        elif along is None:
             # Asked again of the same sides, it would say the same.
             break
     if is_open(field.difference) and not kept.any():
         # Parts of an open scan that no sheet joins learn of one another where both are seen.
-        side = sides_from_vantage(around, side)
+        side = sides_from_vantage(around, side, planes)
     return side

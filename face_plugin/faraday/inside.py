@@ -50,14 +50,14 @@ def inside(
     v : (k, 3) array_like of float
         Vertices of the surface.
     f : (q, 3) array_like of int
-        Triangles of the surface, their normals pointing outwards.
+        Triangles of the surface, their normals pointing outwards. Triangles of zero area have no effect.
     method : {"rays", "winding"}, default: "rays"
         `inside_by_rays` or `inside_by_winding`; the module's description says when they differ.
 
     Returns
     -------
     (n,) ndarray of bool
-        Whether each point is inside.
+        Whether each point is inside; all False for a surface without triangles.
 
     Raises
     ------
@@ -90,12 +90,8 @@ def inside_by_rays(
 
     Parameters
     ----------
-    points : (n, 3) array_like of float
-        Points to classify, in the unit of `v`.
-    v : (k, 3) array_like of float
-        Vertices of the surface.
-    f : (q, 3) array_like of int
-        Triangles of the surface, their normals pointing outwards. Triangles of zero area have no effect.
+    points, v, f
+        As of `inside`.
     directions : int, default: 12
         Rays from each point and round.
     seed : int, default: 0
@@ -104,13 +100,11 @@ def inside_by_rays(
     Returns
     -------
     (n,) ndarray of bool
-        Whether each point is inside; all False for a surface without triangles.
 
     Raises
     ------
     ValueError
-        If an array has the wrong shape, is not finite or names a vertex that does not exist, or `directions`
-        is below 1.
+        As of `inside`, or `directions` is below 1.
 
     Notes
     -----
@@ -158,24 +152,14 @@ def inside_by_winding(points: ArrayLike, v: ArrayLike, f: ArrayLike, *, threshol
 
     Parameters
     ----------
-    points : (n, 3) array_like of float
-        Points to classify, in the unit of `v`.
-    v : (k, 3) array_like of float
-        Vertices of the surface.
-    f : (q, 3) array_like of int
-        Triangles of the surface, their normals pointing outwards. The surface may be open.
+    points, v, f
+        As of `inside`; the surface may be open.
     threshold : float, default: 0.9
         Winding number that a point inside exceeds; the paper's value.
 
     Returns
     -------
     (n,) ndarray of bool
-        Whether each point is inside; all False for a surface without triangles.
-
-    Raises
-    ------
-    ValueError
-        If an array has the wrong shape, is not finite or names a vertex that does not exist.
 
     Notes
     -----

@@ -17,6 +17,8 @@ not turn, and by edges alone; then from the normals as they are, with closure an
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
@@ -27,7 +29,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.graph import Edges, couplings, neighbours_around
 
-__all__ = ["closure", "sheet_couplings", "turned_patches"]
+__all__ = ["Planes", "closure", "planes_of", "turned_patches"]
 
 # Neighbours of the plane that a sheet is taken for, as hosts take by default.
 PLANE_NEIGHBOURS = 30
@@ -64,13 +66,32 @@ def closure(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.f
     return np.asarray(np.clip(1.0 - 2.0 * np.abs(number - 0.5), 0.0, 1.0))
 
 
-def sheet_couplings(around: Neighbourhood) -> tuple[NDArray[np.float64], Edges, NDArray[np.float64]]:
-    """Lines (n, 3) of planes through many neighbours, edges along them, and what these say (e,); less off planes."""
+class Planes(NamedTuple):
+    """Planes through many neighbours of each point, which noise does not turn, and what they say of one another."""
+
+    lines: NDArray[np.float64]
+    """(n, 3) unit normals, of either sign."""
+    edges: Edges
+    """Along the planes."""
+    coupling: NDArray[np.float64]
+    """(e,) as of `couplings`; less where the points lie on no plane."""
+
+
+def planes_of(around: Neighbourhood) -> Planes:
+    """Find the planes of a neighbourhood: once for all who ask it for sides.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> planes = planes_of(Neighbourhood(sphere(500).points))
+    >>> planes.lines.shape, bool((planes.coupling > 0).mean() > 0.4)
+    ((500, 3), True)
+    """
     count = min(PLANE_NEIGHBOURS, len(around) - 1)
     lines, flatness = plane_fits(around.points, around.distance, around.neighbour, count, 1.0)
     edges = neighbours_around(around, lines)
     trust = flatness**2
-    return lines, edges, couplings(around.points, lines, edges) * trust[edges.first] * trust[edges.second]
+    return Planes(lines, edges, couplings(around.points, lines, edges) * trust[edges.first] * trust[edges.second])
 
 
 def turned_patches(
@@ -78,7 +99,7 @@ def turned_patches(
     normals: NDArray[np.float64],
     field: NDArray[np.float64],
     *,
-    by_sheets: bool,
+    planes: Planes | None = None,
     reached: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Which points belong to patches that are to be turned as a whole.
@@ -91,8 +112,8 @@ def turned_patches(
         Unit normals.
     field : (n,) float64
         What the field says of each normal, in [-1, 1]: positive where it points to the lit side.
-    by_sheets : bool
-        Patches of planes through many neighbours and by edges alone, or of the normals as they are.
+    planes : Planes, optional
+        Patches of these and by edges alone; by default of the normals as they are.
     reached : (n,) bool, optional
         Points whose closure counts where it is gained; by default all.
 
@@ -106,13 +127,14 @@ def turned_patches(
     >>> ball = sphere(2000)
     >>> wrong = ball.points[:, 2] > 0.8
     >>> mixed = np.where(wrong[:, None], -ball.normals, ball.normals)
-    >>> found = turned_patches(Neighbourhood(ball.points), mixed, np.zeros(2000), by_sheets=True)
+    >>> around = Neighbourhood(ball.points)
+    >>> found = turned_patches(around, mixed, np.zeros(2000), planes=planes_of(around))
     >>> bool((found == wrong).mean() > 0.99)
     True
     """
     closed = closure(around, normals)
-    if by_sheets:
-        lines, edges, coupling = sheet_couplings(around)
+    if planes is not None:
+        lines, edges, coupling = planes
         side = np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)
         coupling = coupling * side[edges.first] * side[edges.second]
         sign = cluster_signs(len(around), edges, coupling)

@@ -18,7 +18,7 @@ from face_plugin.cloud import Frame
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.graph import couplings, neighbours_around
-from face_plugin.sides.patches import sheet_couplings
+from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.threads import KDTree
 
 __all__ = ["Sensors", "facing", "resettled", "sensors_of", "sides_by_sensors", "sights", "visible"]
@@ -215,7 +215,10 @@ def facing(lines: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.
 
 
 def sides_by_sensors(
-    around: Neighbourhood, seen: NDArray[np.float64], blind: NDArray[np.float64] | None = None
+    around: Neighbourhood,
+    seen: NDArray[np.float64],
+    blind: NDArray[np.float64] | None = None,
+    planes: Planes | None = None,
 ) -> NDArray[np.float64]:
     """Find unit normals (n, 3) that face what saw them, along whole sheets; lines are those of planes.
 
@@ -227,6 +230,8 @@ def sides_by_sensors(
         As `sights` has it.
     blind : (n, 3) float64, optional
         Normals found without sensors: where no sensor saw, they count, as far as they agree with what was seen.
+    planes : Planes, optional
+        Those of `around`, where they are known.
 
     Examples
     --------
@@ -237,7 +242,7 @@ def sides_by_sensors(
     >>> bool(((inward * ball.normals).sum(axis=1) < 0).all())
     True
     """
-    lines, edges, coupling = sheet_couplings(around)
+    lines, edges, coupling = planes or planes_of(around)
     sign = cluster_signs(len(around), edges, coupling, _evidence(lines, seen, blind))
     return np.asarray(lines * sign[:, None])
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
-from face_plugin.sides.patches import sheet_couplings
+from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.sensors import SIGHT, Sensors, facing, sights
 from face_plugin.threads import KDTree
 
@@ -42,10 +42,12 @@ def is_open(difference: NDArray[np.float64]) -> bool:
     return len(difference) > FEWEST and bool(difference.mean() < SHIELDED)
 
 
-def sides_from_vantage(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def sides_from_vantage(
+    around: Neighbourhood, normals: NDArray[np.float64], planes: Planes | None = None
+) -> NDArray[np.float64]:
     """Turn normals (n, 3) to be on one side as seen from the best place; as they are where no place is good.
 
-    Which of the two sides that is, most of the normals decide.
+    Which of the two sides that is, most of the normals decide. `planes` are those of `around`, where they are known.
 
     Examples
     --------
@@ -57,7 +59,7 @@ def sides_from_vantage(around: Neighbourhood, normals: NDArray[np.float64]) -> N
     >>> abs(turned[:, 2].mean())
     1.0
     """
-    lines, edges, coupling = sheet_couplings(around)
+    lines, edges, coupling = planes or planes_of(around)
     best, score = None, WORTH
     for place in _places(around.points):
         evidence = facing(lines, sights(around, place))

@@ -7,19 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from face_plugin.app.cli.console import Console
-from face_plugin.app.cli.options import (
-    add_command,
-    add_interior,
-    add_method,
-    add_sculpt,
-    add_surface,
-    execution_of,
-    params_of,
-    surface_of,
-)
-from face_plugin.app.cli.sensors import add_sensors, sensors_in
+from face_plugin.app.cli.options import add_command
+from face_plugin.app.cli.sensors import sensors_in
+from face_plugin.app.cli.surfaces import add_reconstruction, reconstruction_of, summary_of
 from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
-from face_plugin.surface import is_closed
 
 __all__ = ["register"]
 
@@ -49,11 +40,7 @@ def register(commands: Any) -> None:
         type=Path,
         help=f"also write the sketch with outward normals at its own vertices ({', '.join(_SUFFIXES)})",
     )
-    add_interior(parser, default=True)
-    add_sculpt(parser)
-    add_surface(parser)
-    add_sensors(parser)
-    add_method(parser)
+    add_reconstruction(parser)
 
 
 def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str]:
@@ -63,43 +50,16 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
 
     output = check_output(args.output, MESH_SUFFIXES)
     side_output = None if args.normals is None else check_output(args.normals, _SUFFIXES)
-    params, execution = params_of(args), execution_of(args)
+    options = reconstruction_of(args)
     with console.stage("read"):
         sketch = read_sketch(args.input, width=args.width)
     with console.stage("sample"):
-        samples = sample(sketch, args.points, spacing=args.spacing, seed=params.seed)
-    surface = reconstruct(
-        samples.points,
-        params,
-        filter_interior=args.filter_interior,
-        **sensors_in(args, console),
-        sculpt=args.sculpt,
-        execution=execution,
-        progress=console.progress,
-        **surface_of(args),
-    )
-    result = surface.result
+        samples = sample(sketch, args.points, spacing=args.spacing, seed=options["params"].seed)
+    surface = reconstruct(samples.points, **options, **sensors_in(args, console), progress=console.progress)
     with console.stage("write"):
         write_mesh(output, surface.vertices, surface.faces)
         if side_output is not None:
-            write_normals(side_output, sketch, normals_at_vertices(sketch, samples, result.normals))
-    count = len(samples.points)
-    dropped = count - int(result.kept.sum())
-    closed = is_closed(surface.faces)
-    summary = {
-        "input": args.input,
-        "output": output,
-        "strokes": sketch.stroke_count,
-        "problems": list(sketch.problems),
-        "points": count,
-        "kept": count - dropped,
-        "dropped": dropped,
-        "vertices": len(surface.vertices),
-        "faces": len(surface.faces),
-        "closed": closed,
-        "timings": result.timings,
-        "params": result.params.to_dict(),
-        "execution": execution.to_dict(),
-    }
-    text = f"{output}: {len(surface.faces):,} triangles, {'closed' if closed else 'open'}, from "
-    return summary, text + f"{sketch.stroke_count:,} strokes ({count - dropped:,} of {count:,} points)"
+            write_normals(side_output, sketch, normals_at_vertices(sketch, samples, surface.result.normals))
+    summary, text = summary_of(surface, args, output)
+    summary |= {"strokes": sketch.stroke_count, "problems": list(sketch.problems)}
+    return summary, text + f"{sketch.stroke_count:,} strokes ({summary['kept']:,} of {summary['points']:,} points)"

@@ -91,7 +91,7 @@ def _draw_section(
     # Two spacings to either side: enough points to show a curve, few enough to keep it thin.
     near = section.near(points, 2.0 * spacing_of(points))
     for (vertices, faces), colour, name in zip(
-        meshes, ("#a9a9ad", "#1d1d1f"), ("surface from all points", "surface from points kept"), strict=True
+        meshes, (UNFILTERED, FILTERED), ("surface from all points", "surface from points kept"), strict=True
     ):
         axes.add_collection(
             plt.LineCollection(section.outline(vertices, faces), colors=colour, linewidths=1.2, label=name)

@@ -16,8 +16,46 @@ from numpy.typing import NDArray
 
 from face_plugin.child import environment, failure
 from face_plugin.errors import MeshingError
+from face_plugin.faraday.domain import Box
+from face_plugin.faraday.meshers.boundary import Boundary, snapped_to_box
 
-__all__ = ["run_native"]
+__all__ = ["native_mesh", "run_native"]
+
+
+def native_mesh(
+    library: str, surface: Boundary, box: Box, settings: dict[str, NDArray[np.generic]], *, memory: float, advice: str
+) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.float64], NDArray[np.bool_]]:
+    """Mesh what triangles bound.
+
+    Parameters
+    ----------
+    library, memory, advice
+        As of `run_native`.
+    surface : Boundary
+    box : Box
+        That it bounds from outside.
+    settings : dict of arrays
+        What the worker's function takes beside the triangles.
+
+    Returns
+    -------
+    made : dict of arrays
+        What the library gave.
+    vertices : (m, 3) float64
+        Those of it, on the box's own planes where they are on the box.
+    boundary : (m,) bool
+        Whether they are.
+
+    Raises
+    ------
+    MeshingError
+        As of `run_native`; or there are no tetrahedra.
+    """
+    arrays: dict[str, NDArray[np.generic]] = {"vertices": surface.vertices, "faces": surface.faces, **settings}
+    made = run_native(library, arrays, memory=memory, advice=advice)
+    if len(made["tets"]) == 0:
+        raise MeshingError(f"{library} made no tetrahedra; {advice}")
+    return made, *snapped_to_box(made["vertices"].astype(np.float64), box)
 
 
 def run_native(

@@ -8,13 +8,14 @@ conductor.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from face_plugin.errors import MeshingError, require
+from face_plugin.errors import require
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.meshers import CageMesh
-from face_plugin.faraday.meshers.boundary import boundary_surface, oriented, snapped_to_box
-from face_plugin.faraday.meshers.native import run_native
+from face_plugin.faraday.meshers.boundary import boundary_surface, oriented
+from face_plugin.faraday.meshers.native import native_mesh
 
 __all__ = ["tetgen_mesh"]
 
@@ -59,22 +60,13 @@ def tetgen_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
     require("tetgen", extra="tetgen")
     surface = boundary_surface(balls, box)
     largest = LARGEST_SHARE * float(np.prod(box.upper - box.lower))
-    made = run_native(
-        "tetgen",
-        {
-            "vertices": surface.vertices,
-            "faces": surface.faces,
-            # TetGen keeps 0 for facets without a marker: the box is 1, the balls count from 2.
-            "markers": surface.owner + np.int32(2),
-            "holes": balls.centres,
-            "switches": np.array(f"pq{RADIUS_EDGE_RATIO}a{largest:.17g}Q"),
-        },
-        memory=memory,
-        advice=ADVICE,
-    )
-    if len(made["tets"]) == 0:
-        raise MeshingError(f"tetgen made no tetrahedra; {ADVICE}")
-    vertices, boundary = snapped_to_box(made["vertices"].astype(np.float64), box)
+    settings: dict[str, NDArray[np.generic]] = {
+        # TetGen keeps 0 for facets without a marker: the box is 1, the balls count from 2.
+        "markers": surface.owner + np.int32(2),
+        "holes": balls.centres,
+        "switches": np.array(f"pq{RADIUS_EDGE_RATIO}a{largest:.17g}Q"),
+    }
+    made, vertices, boundary = native_mesh("tetgen", surface, box, settings, memory=memory, advice=ADVICE)
     tets, _ = oriented(vertices, made["tets"].astype(np.int32), flat=0.0)
     owner = np.full(len(vertices), -1, dtype=np.int32)
     markers = made["markers"].ravel().astype(np.int32)

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from face_plugin.errors import MeshingError, require
+from face_plugin.errors import require
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.meshers import CageMesh
-from face_plugin.faraday.meshers.boundary import boundary_surface, oriented, snapped_to_box
-from face_plugin.faraday.meshers.native import run_native
+from face_plugin.faraday.meshers.boundary import boundary_surface, oriented
+from face_plugin.faraday.meshers.native import native_mesh
 
 __all__ = ["PRACTICAL_BALLS", "tetwild_mesh"]
 
@@ -80,22 +80,13 @@ def tetwild_mesh(balls: Balls, box: Box, *, memory: float) -> CageMesh:
             len(balls.radii),
             PRACTICAL_BALLS,
         )
+    settings: dict[str, NDArray[np.generic]] = {
+        "edge_length": np.array(EDGE_LENGTH),
+        "envelope": np.array(ENVELOPE),
+        "optimize": np.array(False),
+    }
     surface = boundary_surface(balls, box)
-    made = run_native(
-        "tetwild",
-        {
-            "vertices": surface.vertices,
-            "faces": surface.faces,
-            "edge_length": np.array(EDGE_LENGTH),
-            "envelope": np.array(ENVELOPE),
-            "optimize": np.array(False),
-        },
-        memory=memory,
-        advice=ADVICE,
-    )
-    if len(made["tets"]) == 0:
-        raise MeshingError(f"tetwild made no tetrahedra; {ADVICE}")
-    vertices, boundary = snapped_to_box(made["vertices"].astype(np.float64), box)
+    made, vertices, boundary = native_mesh("tetwild", surface, box, settings, memory=memory, advice=ADVICE)
     flat = FLATTEST * float((box.upper - box.lower).max())
     tets, _ = oriented(vertices, made["tets"].astype(np.int32), flat)
     # On a face of the box, flat tetrahedra may have had vertices for themselves.

@@ -17,11 +17,13 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-__all__ = ["Cloud", "Frame", "as_points", "morton_distinct", "prepare"]
+__all__ = ["SPACE_OR_PLANE", "Cloud", "Frame", "as_points", "morton_distinct", "prepare"]
 
 log = logging.getLogger(__name__)
 
 MINIMUM_POINTS = 4
+# Dimensions of points that are served.
+SPACE_OR_PLANE = (3, 2)
 # Points nearer than this fraction of the diagonal are one point: below it, balls and tetrahedra degenerate in
 # double precision.
 MERGE_TOLERANCE = 1e-10
@@ -45,27 +47,27 @@ class Frame:
     """
 
     origin: NDArray[np.float64]
-    """(3,) centre of the input, in its unit."""
+    """(d,) centre of the input, in its unit; d is 3, or 2 in the plane."""
     rotation: NDArray[np.float64]
-    """(3, 3) rotation R; its rows are the axes of the canonical frame."""
+    """(d, d) rotation R; its rows are the axes of the canonical frame."""
     scale: float
     """Length of the canonical frame's unit, in the input's unit."""
 
     def to_unit(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Positions (k, 3) from the input's coordinates to the canonical frame."""
+        """Positions (k, d) from the input's coordinates to the canonical frame."""
         unit = (np.asarray(points, dtype=np.float64) - self.origin) / self.scale
         return np.asarray(unit @ self.rotation.T)
 
     def from_unit(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Positions (k, 3) from the canonical frame to the input's coordinates."""
+        """Positions (k, d) from the canonical frame to the input's coordinates."""
         return np.asarray((points @ self.rotation) * self.scale + self.origin)
 
     def rotate(self, vectors: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Directions (k, 3) from the input's axes to the canonical ones."""
+        """Directions (k, d) from the input's axes to the canonical ones."""
         return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.rotation.T)
 
     def unrotate(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Directions (k, 3) from the canonical axes to the input's."""
+        """Directions (k, d) from the canonical axes to the input's."""
         return np.asarray(vectors @ self.rotation)
 
 
@@ -74,14 +76,14 @@ class Cloud:
     """The distinct points of the input in the canonical frame, and the way back."""
 
     points: NDArray[np.float64]
-    """(m, 3) distinct points in the canonical frame, in Morton order."""
+    """(m, d) distinct points in the canonical frame, in Morton order; d is 3, or 2 in the plane."""
     rows: NDArray[np.intp]
     """(n,) the row of `points` that each input point became."""
     frame: Frame
     dtype: np.dtype[np.floating]
     """Floating-point type of the input: results are given in it."""
     flat: bool
-    """Whether the points lie in one plane: the side of their normals is then arbitrary."""
+    """Whether points in space lie in one plane: the side of their normals is then arbitrary."""
 
     @property
     def size(self) -> int:
@@ -94,8 +96,16 @@ class Cloud:
         return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
 
 
-def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
+def as_points(points: ArrayLike, name: str = "points", dimensions: tuple[int, ...] = (3,)) -> NDArray[np.floating]:
     """Return `points` as a finite (n, 3) array of float32 or float64, or say what is wrong with it.
+
+    Parameters
+    ----------
+    points : (n, d) array_like
+    name : str
+        What to call it.
+    dimensions : tuple of int
+        Allowed values of d: `SPACE_OR_PLANE`, or 3 alone.
 
     Raises
     ------
@@ -110,19 +120,22 @@ def as_points(points: ArrayLike, name: str = "points") -> NDArray[np.floating]:
     if _is_masked(points):
         # NumPy would drop the mask, and what lies under it would become points.
         raise ValueError(f"{name} must not hold masked values, found a mask: leave out its rows")
+    shapes = " or ".join(f"(n, {d})" for d in dimensions)
     try:
         array = np.asarray(points)
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{name} must be an (n, 3) array of numbers: {error}") from None
+        raise ValueError(f"{name} must be an {shapes} array of numbers: {error}") from None
     if array.dtype.kind in "iub":
         array = array.astype(np.float64)
     if array.dtype.kind != "f":
         raise ValueError(f"{name} must hold real numbers, found dtype {array.dtype}")
     if array.dtype not in (np.float32, np.float64):
         array = array.astype(np.float32 if array.dtype.itemsize < 4 else np.float64)
-    if array.ndim != 2 or array.shape[1] != 3:
-        hint = "; transpose it" if array.ndim == 2 and array.shape[0] == 3 and array.shape[1] != 3 else ""
-        raise ValueError(f"{name} must have the shape (n, 3), found {array.shape}{hint}")
+    if array.ndim != 2 or array.shape[1] not in dimensions:
+        hint = "; transpose it" if array.ndim == 2 and array.shape[0] in dimensions else ""
+        if array.ndim == 2 and array.shape[1] == 2 and name == "points":
+            hint = "; in the plane there are normals, interior points and the field, and nothing else"
+        raise ValueError(f"{name} must have the shape {shapes}, found {array.shape}{hint}")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         first = ", ".join(map(str, bad[:5])) + (", ..." if len(bad) > 5 else "")
@@ -141,7 +154,7 @@ def prepare(points: ArrayLike) -> Cloud:
 
     Parameters
     ----------
-    points : (n, 3) array_like of float or int, in any unit
+    points : (n, 3) array_like of float or int, in any unit; or (n, 2) in the plane
         At least four distinct points that do not lie on one line.
 
     Returns
@@ -158,7 +171,7 @@ def prepare(points: ArrayLike) -> Cloud:
     >>> prepare([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 3], [0, 0, 3]]).points.shape
     (4, 3)
     """
-    array = as_points(points)
+    array = as_points(points, dimensions=SPACE_OR_PLANE)
     if len(array) < MINIMUM_POINTS:
         raise ValueError(f"points must hold at least {MINIMUM_POINTS} points, found {len(array)}")
     origin, scale = _extent(array)
@@ -191,14 +204,14 @@ def prepare(points: ArrayLike) -> Cloud:
     rows[sort] = place[np.cumsum(first) - 1]
     if len(distinct) < len(array):
         log.info("%d of %d points coincide with another one", len(array) - len(distinct), len(array))
-    flat = bool(extent[2] <= flat_tolerance)
+    flat = len(extent) == 3 and bool(extent[2] <= flat_tolerance)
     if flat:
         log.warning("all points lie in one plane: the side that their normals point to is arbitrary")
     return Cloud(distinct, rows, frame, array.dtype, flat)
 
 
 def _extent(array: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
-    """Centre (3,) and diagonal of the bounding box, without overflow or underflow on the way."""
+    """Centre (d,) and diagonal of the bounding box, without overflow or underflow on the way."""
     lower, upper = array.min(axis=0).astype(np.float64), array.max(axis=0).astype(np.float64)
     with np.errstate(over="ignore"):
         side = upper - lower
@@ -225,8 +238,8 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     variance, vectors = np.linalg.eigh(centred.T @ centred / len(points))
     variance, axes = np.maximum(variance[::-1], 0.0), vectors[:, ::-1].T
     extent = np.ptp(centred @ axes.T, axis=0) / np.ptp(centred @ axes[0])
-    if np.min((variance[:2] - variance[1:]) / variance[0]) < AXIS_GAP:
-        return np.eye(3), extent
+    if np.min((variance[:-1] - variance[1:]) / variance[0]) < AXIS_GAP:
+        return np.eye(len(axes)), extent
     # An axis has no sign of its own: take the one with positive skewness, which turns with the points.
     skewness = ((centred @ axes.T) ** 3).mean(axis=0)
     axes = axes * np.where(skewness < 0, -1.0, 1.0)[:, None]
@@ -249,9 +262,9 @@ def morton_distinct(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDAr
     lower = points.min(axis=0)
     cell = np.floor((points - lower) * (2**MORTON_BITS - 1) / np.ptp(points, axis=0).max()).astype(np.uint64)
     code = np.zeros(len(points), dtype=np.uint64)
-    for axis in range(3):
+    for axis in range(points.shape[1]):
         code |= _spread_bits(cell[:, axis]) << np.uint64(axis)
-    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0], code))
+    order = np.lexsort((*points.T[::-1], code))
     step = np.abs(np.diff(points[order], axis=0)).max(axis=1)
     leads = np.concatenate([[True], step > MERGE_TOLERANCE])
     # Twins on two sides of a border between cells are far apart in the order.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from face_plugin import cloud
 from face_plugin.execution import EngineLike, Execution
 from face_plugin.params import Params, settled
+from face_plugin.plane import refuse_in_plane
 from face_plugin.result import Result, Surface, kept_points
 from face_plugin.sculpt import SculptFile
 from face_plugin.sides.given import checked_trust, given_lines
@@ -53,8 +54,8 @@ def solve(
     >>> type(solve(sphere(500).points)).__name__
     'FaCE'
     """
-    array, (params, execution) = cloud.as_points(points), settled(params, execution)
-    if in_tiles(len(array), execution):
+    array, (params, execution) = cloud.as_points(points, dimensions=cloud.SPACE_OR_PLANE), settled(params, execution)
+    if array.shape[1] == 3 and in_tiles(len(array), execution):
         return Tiled(array, params, sensors=sensors, classify=classify, execution=execution, progress=progress)
     return FaCE(array, params, sensors=sensors, execution=execution, progress=progress)
 
@@ -84,8 +85,9 @@ def solve_whole(
     ValueError
         There is not the memory for it.
     """
-    array, (params, execution) = cloud.as_points(points), settled(params, execution)
-    check_one_piece(len(array), execution, purpose)
+    array, (params, execution) = cloud.as_points(points, dimensions=cloud.SPACE_OR_PLANE), settled(params, execution)
+    if array.shape[1] == 3:
+        check_one_piece(len(array), execution, purpose)
     return FaCE(array, params, sensors=sensors, execution=execution, progress=progress)
 
 
@@ -104,11 +106,12 @@ def estimate_normals(
 ) -> Result:
     """Outward normals of an unoriented point cloud by Faraday cage estimation.
 
-    Large clouds are solved in tiles, as `Execution.tile_points` says; see `face_plugin.tiles`.
+    Large clouds are solved in tiles, as `Execution.tile_points` says; see `face_plugin.tiles`. Points in the plane are
+    taken for curves and solved in one piece; there are no sensors and no edits.
 
     Parameters
     ----------
-    points : (n, 3) array_like of float or int, in any unit
+    points : (n, 3) array_like of float or int, in any unit; or (n, 2) in the plane
         At least four distinct points that do not lie on one line. Duplicates are allowed.
     params : Params, optional
     filter_interior : bool
@@ -148,6 +151,7 @@ def estimate_normals(
     >>> bool(((normals * ball.normals).sum(axis=1) > 0).all())
     True
     """
+    refuse_in_plane(points, viewpoints=viewpoints, seen_from=seen_from, up=up, sculpt=sculpt)
     sensors = sensors_of(viewpoints, seen_from, up)
     params, execution = settled(params, execution, engine)
     if sculpt is None:
@@ -181,14 +185,14 @@ def orient_normals(
     ----------
     points, params, viewpoints, seen_from, up, execution, engine, progress
         As in `estimate_normals`, whose normals tell the side of each line; it is then settled along sheets.
-    normals : (n, 3) array_like
+    normals : (n, 3) array_like; (n, 2) of points in the plane
         Of any length but 0 and of either sign.
     trusted : (n,) array_like of bool, optional
         Normals that stay as they are, and whose side is handed on along the sheets that they are part of.
 
     Returns
     -------
-    (n, 3) array
+    (n, d) array
         In the floating-point type of `normals`; each row is that of `normals`, or its negative.
 
     Raises
@@ -207,10 +211,12 @@ def orient_normals(
     >>> bool((orient_normals(ball.points, mixed) == ball.normals).all())
     True
     """
-    array, sensors = cloud.as_points(points), sensors_of(viewpoints, seen_from, up)
+    refuse_in_plane(points, viewpoints=viewpoints, seen_from=seen_from, up=up)
+    array = cloud.as_points(points, dimensions=cloud.SPACE_OR_PLANE)
+    sensors = sensors_of(viewpoints, seen_from, up)
     params, execution = settled(params, execution, engine)
     # Bad normals are said before the cage is solved.
-    given_lines(normals, len(array))
+    given_lines(normals, len(array), array.shape[1])
     checked_trust(trusted, len(array))
     solved = solve(array, params, sensors=sensors, execution=execution, progress=progress)
     return solved.oriented(normals, trusted)
@@ -267,9 +273,11 @@ def reconstruct(
     3
     """
     backend = check_arguments(depth, backend, trim, trim_distance)
+    # Curves bound no surface: said before the cage is solved.
+    array = cloud.as_points(points)
     params, execution = settled(params, execution, engine)
     result = estimate_normals(
-        points,
+        array,
         params,
         filter_interior=filter_interior,
         viewpoints=viewpoints,
@@ -279,7 +287,6 @@ def reconstruct(
         execution=execution,
         progress=progress,
     )
-    array = cloud.as_points(points)
     keep = kept_points(result)
     report = progress or (lambda stage, fraction: None)
     report("surface", 0.0)

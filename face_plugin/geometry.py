@@ -14,7 +14,7 @@ __all__ = ["local_spacing", "log_ramp", "plane_fit", "plane_fits", "ramp", "thin
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return vectors (k, 3) at length one; a zero vector becomes the z axis.
+    """Return vectors (k, d) at length one; a zero vector becomes the last axis.
 
     Examples
     --------
@@ -23,11 +23,11 @@ def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
            [0., 0., 1.]])
     """
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.where(length > 0, vectors / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+    return np.where(length > 0, vectors / np.where(length > 0, length, 1.0), np.eye(vectors.shape[1])[-1])
 
 
 def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[np.float64]:
-    """Mean distance of each point (n, 3) to its nearest `neighbours` others, in the points' unit.
+    """Mean distance of each point (n, d) to its nearest `neighbours` others, in the points' unit.
 
     Examples
     --------

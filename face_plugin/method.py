@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.angles.borders import bend_borders
+from face_plugin.angles.curves import turn_to_curves
 from face_plugin.angles.levelling import level, level_weight
 from face_plugin.angles.turning import turn_angles
 from face_plugin.faraday import field
@@ -25,6 +26,7 @@ from face_plugin.faraday.solve import SolvedCage, solve_cage
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
+from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
 from face_plugin.sides.enclosure import DARK
 from face_plugin.sides.patches import Planes, planes_of, turned_patches
 from face_plugin.sides.sensors import resettled, sides_by_sensors
@@ -33,7 +35,7 @@ from face_plugin.sides.steps import turn_sides
 from face_plugin.sides.vantage import is_open, sides_from_vantage
 from face_plugin.stages import Stage
 
-__all__ = ["Solved", "orient", "refine", "solve_field"]
+__all__ = ["Solved", "orient", "refine", "refine_curves", "solve_field"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,11 @@ def solve_field(
     # Where balls go: near-duplicates are left out, and points on sheets with nothing else near.
     with stage("cage"):
         spacing = None if params.cage_spacing is None else params.cage_spacing / scale
-        separation, sheets = cage_separation(around, spacing, coarsen=params.angles == "refined")
+        coarsen = params.angles == "refined"
+        if around.plane:
+            separation, sheets = curve_separation(around, spacing, coarsen=coarsen), None
+        else:
+            separation, sheets = cage_separation(around, spacing, coarsen=coarsen)
     points = around.points
     # The neighbours take a tenth of the memory of what follows: who needs them no more need not hold them.
     del around
@@ -112,9 +118,11 @@ def orient(
 
     Returns
     -------
-    (n, 3) float64
+    (n, d) float64
         Unit normals that point to free space.
     """
+    if around.plane:
+        return field.normals if params.angles == "field" else refine_curves(around, field)
     if plane is not None:
         # The field is the same on both sides of a sheet: its mean gradient lies in the sheet.
         normals = np.tile(plane, (len(around), 1))
@@ -192,6 +200,39 @@ def refine(
         # The angle is known better now, and so is which side of it was seen.
         refined = resettled(around, refined, sights, unit(blind))
     return np.where(still[:, None], field.votes, refined)
+
+
+def refine_curves(around: Neighbourhood, field: FieldAtPoints) -> NDArray[np.float64]:
+    """Refine the normals of points in the plane, as `refine` does in space.
+
+    Parameters
+    ----------
+    around : Neighbourhood
+        Of the points (n, 2).
+    field : FieldAtPoints
+
+    Returns
+    -------
+    (n, 2) float64
+        Unit normals that point to free space.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes.curves import circle
+    >>> ring = circle(300)
+    >>> rough = FieldAtPoints(np.ones(300), ring.normals, np.ones(300))
+    >>> bool(((refine_curves(Neighbourhood(ring.points), rough) * ring.normals).sum(axis=1) > 0.999).all())
+    True
+    """
+    # 1. Line: neighbours of any side tell it.
+    lines = turn_to_curves(around, lines_of_curves(around).normals, signed=False)
+    # 2. Side: along the curves, and by the field.
+    side = sides_of_curves(lines.foot, lines.normals, lines.error, field.votes, field.lean)
+    # 3. Angle: now that sides are known, the other bank of a slot takes no part.
+    turned = turn_to_curves(around, lines.normals * side[:, None], signed=True)
+    turned = turn_to_curves(around, turned.normals, signed=True)
+    # A handful of points is no curve: the field knows as much.
+    return np.where(np.isfinite(turned.error)[:, None], turned.normals, field.normals)
 
 
 def _sides_by_field(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from face_plugin.threads import KDTree
 from face_plugin.winding import DipoleTree
+from face_plugin.winding_plane import PlaneTree
 
 __all__ = ["Neighbourhood"]
 
@@ -31,11 +32,16 @@ class Neighbourhood:
     """
 
     points: NDArray[np.float64]
-    """(n, 3) distinct; in Morton order for speed."""
+    """(n, d) distinct; in Morton order for speed. d is 3, or 2 in the plane."""
 
     def __len__(self) -> int:
         """Return the number n of points."""
         return len(self.points)
+
+    @property
+    def plane(self) -> bool:
+        """Whether the points lie in the plane, on curves, and not in space, on surfaces."""
+        return bool(self.points.shape[1] == 2)
 
     @cached_property
     def _found(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -59,5 +65,9 @@ class Neighbourhood:
 
     @cached_property
     def tree(self) -> DipoleTree:
-        """Dipoles at the points, each of the area of a square as wide as the spacing."""
+        """Dipoles at the points, each of the area of a square as wide as the spacing; on a curve, of a length."""
+        if self.plane:
+            # Within the distance to the last of the 6 nearest there is twice that of curve, however points are spread.
+            count = min(SPACING_NEIGHBOURS, self.distance.shape[1] - 1)
+            return PlaneTree(self.points, 2.0 / count * self.distance[:, count])
         return DipoleTree(self.points, self.spacing**2)

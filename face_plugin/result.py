@@ -26,7 +26,7 @@ class Result:
     """What the method says of each input point, in the order of the input."""
 
     normals: NDArray[np.floating]
-    """(n, 3) outward unit normals, in the input's floating-point type."""
+    """(n, 3) outward unit normals, in the input's floating-point type; (n, 2) in the plane."""
     strength: NDArray[np.floating]
     """(n,) E_max at the point's ball; unshielded space has 1."""
     confidence: NDArray[np.floating]

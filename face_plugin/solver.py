@@ -15,10 +15,12 @@ from face_plugin.faraday import field
 from face_plugin.faraday.gradient import FieldAtPoints, field_at_points
 from face_plugin.faraday.isosurface import shielded
 from face_plugin.faraday.locate import Locator
+from face_plugin.faraday.locate_plane import PlaneLocator
 from face_plugin.faraday.solve import SolvedCage
 from face_plugin.method import orient, solve_field
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params, settled
+from face_plugin.plane import refuse_in_plane
 from face_plugin.result import Result
 from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sculpt.sculptor import Sculptor
@@ -60,7 +62,7 @@ class Reading:
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
-        """Normals of the distinct points (m, 3)."""
+        """Normals of the distinct points (m, d)."""
         with self.stage("normals"):
             return orient(self.around, self.seen, self.params, plane=self.plane, sheets=self.sheets, sights=self.sights)
 
@@ -91,7 +93,10 @@ class Reading:
         with self.stage("interior"):
             # What alpha is derived from decides as well.
             inside = self.enclosed.copy() if alpha == "auto" else np.ones(len(self.around), dtype=np.bool_)
-            if inside.any():
+            if self.around.plane:
+                # Each point has the field of the disc nearest to it: no isoline needs to be drawn.
+                inside &= self.seen.strength < level
+            elif inside.any():
                 candidates = self.around.points[inside]
                 inside[inside] = shielded(self.cage.mesh, self.strength, candidates, level, self.params.inside)
             return inside
@@ -102,7 +107,7 @@ class FaCE(Sculptable):
 
     Parameters
     ----------
-    points : (n, 3) array_like of float or int, in any unit
+    points : (n, 3) array_like of float or int, in any unit; or (n, 2) in the plane
     params : Params, optional
     sensors : Sensors, optional
         Where sensors stood: normals then point to what they saw.
@@ -143,6 +148,7 @@ class FaCE(Sculptable):
         progress: Progress | None = None,
     ) -> None:
         self.params, self.execution = settled(params, execution)
+        refuse_in_plane(points, sensors=sensors)
         clock = Clock(progress)
         self.timings = clock.seconds
         with clock("cloud"):
@@ -166,6 +172,11 @@ class FaCE(Sculptable):
         local = None if sensors is None else sensors.in_frame(self.frame, self.cloud.rows)
         self._reading = Reading(solved.cage, around, solved.sheets, plane, self.params, solved.strength, clock, local)
 
+    @property
+    def _dimensions(self) -> tuple[int]:
+        """Dimension of the cloud, as `face_plugin.cloud.as_points` takes it."""
+        return (self.cloud.points.shape[1],)
+
     def _follow(self) -> None:
         self._reading = dataclasses.replace(self._reading, params=self.params, strength=self._sculptor.strength)
 
@@ -175,12 +186,12 @@ class FaCE(Sculptable):
         return self._sculptor.strength
 
     def normals(self) -> NDArray[np.floating]:
-        """Outward unit normals (n, 3) of the input points, in their order and floating-point type."""
+        """Outward unit normals (n, d) of the input points, in their order and floating-point type."""
         return self.frame.unrotate(self._reading.normals)[self.cloud.rows].astype(self.cloud.dtype)
 
     def oriented(self, normals: ArrayLike, trusted: ArrayLike | None = None) -> NDArray[np.floating]:
-        """Turn the signs of normals (n, 3) that are given, as `face_plugin.orient_normals` does."""
-        given, lines = given_lines(normals, self.cloud.size)
+        """Turn the signs of normals (n, d) that are given, as `face_plugin.orient_normals` does."""
+        given, lines = given_lines(normals, self.cloud.size, self._dimensions[0])
         trust, rows, lines = checked_trust(trusted, self.cloud.size), self.cloud.rows, self.frame.rotate(lines)
         reading = self._reading
         # What a sensor saw is certain, whatever the field says.
@@ -190,7 +201,7 @@ class FaCE(Sculptable):
         return np.where(side[:, None] < 0, -given, given)
 
     def potential(self) -> NDArray[np.float64]:
-        """Potentials (m, 3) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""
+        """Potentials (m, d) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""
         return self._sculptor.potential
 
     def strength(self, query: ArrayLike) -> NDArray[np.float64]:
@@ -198,20 +209,20 @@ class FaCE(Sculptable):
 
         Parameters
         ----------
-        query : (k, 3) array_like, in the unit of the input
+        query : (k, d) array_like, in the unit of the input
 
         Returns
         -------
         (k,) float64
             Inside a ball, the mean of its cage vertices; outside the box, 1, the strength of unshielded space.
         """
-        local = self.frame.to_unit(cloud.as_points(query, "query"))
+        local = self.frame.to_unit(cloud.as_points(query, "query", self._dimensions))
         return self.locator.interpolate(local, self.vertex_strength, outside=1.0)
 
     @cached_property
-    def locator(self) -> Locator:
+    def locator(self) -> Locator | PlaneLocator:
         """Interpolation of any values at the vertices of the mesh, for positions in the canonical frame."""
-        return Locator(self.mesh)
+        return PlaneLocator(self.mesh) if self._reading.around.plane else Locator(self.mesh)
 
     def interior(self, alpha: float | str | None = None) -> NDArray[np.bool_]:
         """Which input points lie inside the object. Nothing is solved again, whatever alpha.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.cloud import as_points
+from face_plugin.cloud import SPACE_OR_PLANE, as_points
 from face_plugin.estimate import solve
 from face_plugin.execution import Execution
 from face_plugin.params import Params
@@ -30,8 +30,8 @@ class PointSet:
 
     Parameters
     ----------
-    points : (n, 3) array_like of float or int, in any unit
-    normals : (n, 3) array_like of float, optional
+    points : (n, 3) array_like of float or int, in any unit; or (n, 2) in the plane
+    normals : (n, d) array_like of float, optional
         Rows of points that are not kept may be zero.
     keep : (n,) array_like of bool, optional
         Points that later steps use; all by default.
@@ -68,7 +68,7 @@ class PointSet:
     sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
-        points = as_points(self.points)
+        points = as_points(self.points, dimensions=SPACE_OR_PLANE)
         count = len(points)
         self._set("points", points)
         if self.normals is not None:

@@ -18,10 +18,10 @@ def broken(row, value):
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        ([], r"points must have the shape \(n, 3\), found \(0,\)"),
+        ([], r"points must have the shape \(n, 3\) or \(n, 2\), found \(0,\)"),
         (np.empty((0, 3)), "points must hold at least 4 points, found 0"),
         (GOOD[:3], "points must hold at least 4 points, found 3"),
-        (GOOD[:, :2], r"points must have the shape \(n, 3\), found \(60, 2\)$"),
+        (GOOD[:, :1], r"points must have the shape \(n, 3\) or \(n, 2\), found \(60, 1\)$"),
         (GOOD.T, r"found \(3, 60\); transpose it"),
         (GOOD[None], r"found \(1, 60, 3\)"),
         (5.0, r"found \(\)"),

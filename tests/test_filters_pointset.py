@@ -11,7 +11,7 @@ from face_plugin.shapes import sphere
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"points": np.zeros((3, 2))}, r"points must have the shape \(n, 3\), found \(3, 2\)"),
+        ({"points": np.zeros((3, 4))}, r"points must have the shape \(n, 3\) or \(n, 2\), found \(3, 4\)"),
         ({"points": [[0, 0, np.nan]]}, "points must be finite, found NaN or infinity in 1 of 1 rows: 0"),
         ({"points": np.eye(3), "normals": np.eye(3)[:2]}, r"normals must be \(3, 3\) of.*found \(2, 3\)"),
         ({"points": np.eye(3), "normals": np.eye(3, dtype=int)}, "normals must be .* found .* of int64"),

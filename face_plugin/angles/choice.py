@@ -9,7 +9,16 @@ from face_plugin.angles.fits import ROOT, SAME_SIDE, LocalFits
 from face_plugin.compiled import compiled
 from face_plugin.threads import in_threads
 
-__all__ = ["FLATNESS", "LEAST", "combine_fits"]
+__all__ = [
+    "FLATNESS",
+    "FOLD_PLANE",
+    "FOLD_QUADRIC",
+    "LEAST",
+    "OFF",
+    "RIM",
+    "TOLERANCE",
+    "combine_fits",
+]
 
 # Fits of this many nearest points are looked at, the point's own among them: near an edge, those a little way into the
 # face that the point lies on do not see the edge.

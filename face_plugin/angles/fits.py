@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from face_plugin.compiled import compiled
 from face_plugin.threads import in_threads
 
-__all__ = ["LocalFits", "fit_surfaces"]
+__all__ = ["MOST", "SAME_SIDE", "WEIGHT_WIDTH", "LocalFits", "fit_surfaces"]
 
 # Neighbours of a fit, the point itself among them: each size twice the last, from twice the coefficients of a quadric.
 SIZES = (12, 24, 48, 96)

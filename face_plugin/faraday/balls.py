@@ -1,4 +1,7 @@
-"""The Faraday cage: a small conducting ball at each point, as a platonic solid (paper section 3.1)."""
+"""The Faraday cage: a small conducting ball at each point, as a platonic solid (paper section 3.1).
+
+In the plane a ball is a disc, as a regular polygon of as many vertices.
+"""
 
 from __future__ import annotations
 
@@ -35,11 +38,11 @@ class Balls:
     points: NDArray[np.intp]
     """(b,) row of the cloud's point at the centre of each ball."""
     centres: NDArray[np.float64]
-    """(b, 3) centres."""
+    """(b, d) centres; d is 3, or 2 in the plane."""
     radii: NDArray[np.float64]
     """(b,) radii; no two balls touch."""
     vertices: NDArray[np.float64]
-    """(b, s, 3) vertices of each ball, on its sphere."""
+    """(b, s, d) vertices of each ball, on its sphere."""
 
 
 def build_balls(
@@ -56,12 +59,13 @@ def build_balls(
 
     Parameters
     ----------
-    points : (n, 3) float64, distinct
+    points : (n, d) float64, distinct
     rows : (b,) intp
         Which of the points carry a ball.
     radius : float, fraction of the distance to the nearest other ball's centre
         Below 0.5 the balls are disjoint.
     solid : {"octahedron", "icosahedron"}
+        In the plane a polygon of as many vertices: 6 or 12.
     seed : int
 
     Raises
@@ -79,9 +83,24 @@ def build_balls(
     centres = points[rows]
     nearest = KDTree(centres).query(centres, k=2)[0][:, 1]
     radii = radius * nearest
-    turns = _random_rotations(len(rows), seed)
-    vertices = centres[:, None] + radii[:, None, None] * np.einsum("sj,bij->bsi", SOLIDS[solid], turns)
+    flat = points.shape[1] == 2
+    corners = _polygon(len(SOLIDS[solid])) if flat else SOLIDS[solid]
+    turns = (_random_turns if flat else _random_rotations)(len(rows), seed)
+    vertices = centres[:, None] + radii[:, None, None] * np.einsum("sj,bij->bsi", corners, turns)
     return Balls(rows, centres, radii, vertices)
+
+
+def _polygon(count: int) -> NDArray[np.float64]:
+    """Vertices (count, 2) of a regular polygon."""
+    angle = 2.0 * np.pi * np.arange(count) / count
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _random_turns(count: int, seed: int) -> NDArray[np.float64]:
+    """(count, 2, 2) rotations of the plane, uniform."""
+    angle = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, count)
+    x, y = np.cos(angle), np.sin(angle)
+    return np.ascontiguousarray(np.array([[x, -y], [y, x]]).transpose(2, 0, 1))
 
 
 def _random_rotations(count: int, seed: int) -> NDArray[np.float64]:

@@ -28,9 +28,9 @@ class Box:
     """Axis-aligned box in the canonical frame."""
 
     lower: NDArray[np.float64]
-    """(3,) lower corner."""
+    """(d,) lower corner; d is 3, or 2 in the plane."""
     upper: NDArray[np.float64]
-    """(3,) upper corner."""
+    """(d,) upper corner."""
     cells: int = COARSE_CELLS
     """Cells that it is cut into along its longest side before refinement."""
 
@@ -40,9 +40,9 @@ class Filling:
     """Vertices of the domain that belong to no ball."""
 
     inner: NDArray[np.float64]
-    """(p, 3) inside the box, outside the balls."""
+    """(p, d) inside the box, outside the balls."""
     outer: NDArray[np.float64]
-    """(q, 3) on the box, its corners among them."""
+    """(q, d) on the box, its corners among them."""
 
 
 def padded_box(balls: Balls, padding: float, least_side: float = 0.25) -> Box:
@@ -75,7 +75,7 @@ def fill(
     seed: int,
     most: float = math.inf,
 ) -> Filling:
-    """Place free vertices at the leaf centres of an octree that is fine near the balls.
+    """Place free vertices at the leaf centres of an octree, in the plane a quadtree, that is fine near the balls.
 
     A cell is refined while its size exceeds ``max(grading * distance to the nearest ball, finest * local spacing)``.
 
@@ -107,9 +107,9 @@ def fill(
     tree = KDTree(balls.centres)
     side = box.upper - box.lower
     cells = np.maximum(np.round(side / (side.max() / box.cells)), 1).astype(np.int64)
-    cell = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
+    cell = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, len(side))
     inner, outer = [], []
-    octants = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(1, 8, 3)
+    octants = _corners(len(side))[None]
     rng = np.random.default_rng(seed)
     cells_so_far = 0
     for level in range(MAXIMUM_LEVEL):
@@ -118,7 +118,7 @@ def fill(
         distance, nearest = tree.query(centre)
         split = size.max() > np.maximum(grading * distance, finest * spacing[nearest])
         cells_so_far += np.count_nonzero(~split)
-        if cells_so_far + 8 * np.count_nonzero(split) > most:
+        if cells_so_far + octants.shape[1] * np.count_nonzero(split) > most:
             raise MeshingError(
                 f"the space between {len(balls.radii)} balls takes more than {most:.0f} free vertices, which is "
                 "what the memory allowed holds; try a larger Params.finest, Params.grading or "
@@ -131,15 +131,19 @@ def fill(
         outer.append(_on_box(leaf_cell, cells << level, box))
         if not split.any():
             break
-        cell = (2 * cell[split][:, None] + octants).reshape(-1, 3)
+        cell = (2 * cell[split][:, None] + octants).reshape(-1, len(side))
     return Filling(np.concatenate(inner), _unique(np.concatenate(outer), side.max()))
+
+
+def _corners(dimension: int) -> NDArray[np.int64]:
+    """Corners (2 ** d, d) of the unit cube."""
+    return np.stack(np.meshgrid(*dimension * [[0, 1]], indexing="ij"), axis=-1).reshape(-1, dimension)
 
 
 def _on_box(cell: NDArray[np.int64], cells: NDArray[np.int64], box: Box) -> NDArray[np.float64]:
     """Corners of the cells that lie on the box, repeated where cells share them."""
     touching = cell[((cell == 0) | (cell == cells - 1)).any(axis=1)]
-    corner = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(1, 8, 3)
-    corner = (touching[:, None] + corner).reshape(-1, 3)
+    corner = (touching[:, None] + _corners(len(cells))).reshape(-1, len(cells))
     corner = np.unique(corner[((corner == 0) | (corner == cells)).any(axis=1)], axis=0)
     # Interpolate so that the box's own planes are hit exactly: a vertex is on the box where a coordinate equals it.
     t = corner / cells

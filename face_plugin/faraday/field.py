@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from face_plugin.compiled import compiled
 from face_plugin.faraday.meshers import CageMesh
+from face_plugin.faraday.triangles import half_circle, strength_in_plane, triangle_vertex_gradients
 
 __all__ = ["half_icosahedron", "strength", "strength_exact", "strength_of_directions", "vertex_gradients"]
 
 
 def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Gradients of piecewise linear functions, averaged at each vertex over its tetrahedra by volume (paper 3.3).
+
+    In the plane over its triangles, by area.
 
     Parameters
     ----------
@@ -24,7 +27,7 @@ def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.
 
     Returns
     -------
-    (m, 3, s) float64
+    (m, d, s) float64
         Column k holds the gradient of function k. Zero at a vertex that no tetrahedron uses.
 
     Examples
@@ -34,6 +37,8 @@ def vertex_gradients(mesh: CageMesh, values: NDArray[np.float64]) -> NDArray[np.
     >>> vertex_gradients(mesh, corners @ np.array([[1.0], [2.0], [3.0]]))[0].ravel()
     array([1., 2., 3.])
     """
+    if mesh.vertices.shape[1] == 2:
+        return triangle_vertex_gradients(mesh.vertices, mesh.tets, values)
     out = np.zeros((len(mesh.vertices), 3, values.shape[1]))
     weight = np.zeros(len(mesh.vertices))
     _add_gradients(mesh.vertices, mesh.tets, np.ascontiguousarray(values), out, weight)
@@ -72,15 +77,15 @@ def _add_gradients(vertices, tets, values, out, weight):  # type: ignore[no-unty
 
 
 def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """E_max over all directions: the largest singular value of each 3x3 matrix of gradients.
+    """E_max over all directions: the largest singular value of each matrix of gradients, 3x3, or 2x2 in the plane.
 
     The potential is linear in the direction v of the external field, so with the three basis solutions in the columns
     of G its field is G v, and ``max |G v|`` over unit v is the largest singular value of G: the limit of paper
-    equation 5 for infinitely many directions, at the price of three.
+    equation 5 for infinitely many directions, at the price of three; in the plane, of two.
 
     Parameters
     ----------
-    gradients : (m, 3, 3) float64
+    gradients : (m, d, d) float64
 
     Returns
     -------
@@ -91,6 +96,8 @@ def strength_exact(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
     >>> strength_exact(np.diag([1.0, -3.0, 2.0])[None])
     array([3.])
     """
+    if gradients.shape[1] == 2:
+        return strength_in_plane(gradients)
     out = np.empty(len(gradients))
     _strength_exact(np.ascontiguousarray(gradients), out)
     return out
@@ -157,8 +164,9 @@ def strength_of_directions(gradients: NDArray[np.float64], directions: NDArray[n
 
 
 def strength(mesh: CageMesh, potential: NDArray[np.float64], directions: str) -> NDArray[np.float64]:
-    """E_max (m,) at the vertices from the three basis potentials (m, 3); `directions` as in `Params`."""
+    """E_max (m,) at the vertices from the basis potentials (m, d); `directions` as in `Params`."""
     gradients = vertex_gradients(mesh, potential)
     if directions == "exact":
         return strength_exact(gradients)
-    return strength_of_directions(gradients, half_icosahedron())
+    paper = half_circle() if gradients.shape[1] == 2 else half_icosahedron()
+    return strength_of_directions(gradients, paper)

@@ -32,7 +32,7 @@ class FieldAtPoints:
     strength: NDArray[np.float64]
     """(n,) E_max at the nearest ball."""
     normals: NDArray[np.float64]
-    """(n, 3) unit gradients of E_max, which point outward."""
+    """(n, d) unit gradients of E_max, which point outward."""
     difference: NDArray[np.float64]
     """(n,) how far the two sides differ, in [0, 1]: 0 where the field is alike on both, 1 where one is shielded."""
 
@@ -43,7 +43,7 @@ class FieldAtPoints:
 
     @property
     def votes(self) -> NDArray[np.float64]:
-        """`normals` (n, 3), zero where there is no field: its gradient there is rounding, and must not spread."""
+        """`normals` (n, d), zero where there is no field: its gradient there is rounding, and must not spread."""
         return np.where((self.strength > ROUNDING)[:, None], self.normals, 0.0)
 
 
@@ -59,7 +59,7 @@ def field_at_points(
         E_max at the vertices of the mesh.
     balls : Balls
         Of the mesh.
-    points : (n, 3) float64
+    points : (n, d) float64
         In the frame of the mesh.
     """
     ball = KDTree(balls.centres).query(points)[1]
@@ -90,7 +90,7 @@ def field_normals(mesh: CageMesh, strength: NDArray[np.float64]) -> NDArray[np.f
 
     Returns
     -------
-    (b, 3) float64
+    (b, d) float64
     """
     gradient = vertex_gradients(mesh, strength[:, None])[:, :, 0]
     return unit(ball_means(mesh, gradient))
@@ -99,7 +99,7 @@ def field_normals(mesh: CageMesh, strength: NDArray[np.float64]) -> NDArray[np.f
 def carry(
     centres: NDArray[np.float64], normals: NDArray[np.float64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Give points (n, 3) without a ball normals: those of the nearest balls, weighted by inverse distance.
+    """Give points (n, d) without a ball normals: those of the nearest balls, weighted by inverse distance.
 
     A point that is a ball's centre keeps that ball's normal exactly.
 

@@ -24,6 +24,7 @@ from threadpoolctl import ThreadpoolController
 
 from face_plugin.compiled import compiled
 from face_plugin.faraday.meshers import CageMesh
+from face_plugin.faraday.triangles import triangle_stiffness
 
 __all__ = ["Poisson", "stiffness"]
 
@@ -119,12 +120,12 @@ def columns(mesh: CageMesh) -> NDArray[np.int64]:
 def stiffness(vertices: NDArray[np.float64], tets: NDArray[np.int32], column: NDArray[np.int64]) -> sparse.csr_matrix:
     """Rows of the cotangent Laplacian L that belong to free vertices.
 
-    The entry of an edge is ``L_ij = sum over tets of volume * grad(phi_i) . grad(phi_j)``.
+    The entry of an edge is ``L_ij = sum over tets of volume * grad(phi_i) . grad(phi_j)``; in the plane over triangles.
 
     Parameters
     ----------
-    vertices : (m, 3) float64
-    tets : (t, 4) int32
+    vertices : (m, d) float64
+    tets : (t, d + 1) int32
     column : (m,) int64
         As `columns` gives it.
 
@@ -142,6 +143,8 @@ def stiffness(vertices: NDArray[np.float64], tets: NDArray[np.int32], column: ND
     """
     free, box = int(np.count_nonzero(column >= 0)), int(np.count_nonzero(column < -1))
     flat = np.where(column >= 0, column, np.where(column < -1, free - 2 - column, free + box))
+    if vertices.shape[1] == 2:
+        return triangle_stiffness(vertices, tets, flat, free, free + box + 1)
     row = flat[tets.ravel()]
     start = np.zeros(free + 1, dtype=np.int64)
     np.cumsum(4 * np.bincount(row[row < free], minlength=free), out=start[1:])

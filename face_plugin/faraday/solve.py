@@ -39,11 +39,11 @@ class SolvedCage:
     mesh: CageMesh
     poisson: Poisson
     potential: NDArray[np.float64]
-    """(m, 3) at the vertices: column k is that of a unit field along canonical axis k."""
+    """(m, d) at the vertices: column k is that of a unit field along canonical axis k."""
 
     @property
     def cage_value(self) -> NDArray[np.float64]:
-        """Potential (3,) of the cage in each."""
+        """Potential (d,) of the cage in each."""
         return np.asarray(self.potential[np.argmax(self.mesh.owner >= 0)])
 
 
@@ -58,11 +58,12 @@ def solve_cage(
     memory: float | None = None,
     stage: Stage = nullcontext,
 ) -> SolvedCage:
-    """Build a cage on points and solve its three basis potentials (paper sections 3.1 and 3.2).
+    """Build a cage on points and solve its basis potentials, one along each axis (paper sections 3.1 and 3.2).
 
     Parameters
     ----------
-    points : (n, 3) float64, distinct, in the canonical frame
+    points : (n, d) float64, distinct, in the canonical frame
+        d is 3, or 2 in the plane.
     separation : (n,) float64
         Smallest distance between balls at each point.
     params : Params
@@ -119,7 +120,8 @@ def _mesh(
             balls = _within(balls, box)
         else:
             box = padded_box(balls, params.padding, params.least_side)
-        spacing = local_spacing(balls.centres)
+        # Along a curve the two nearest are the neighbours.
+        spacing = local_spacing(balls.centres, 2 if points.shape[1] == 2 else 6)
     # Tetrahedra between the box and the balls, graded from these to it.
     with stage("mesh"):
         return balls, build_mesh(balls, spacing, box, params, memory)

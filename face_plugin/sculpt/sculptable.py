@@ -13,7 +13,9 @@ from typing import Literal, SupportsIndex, TypeVar
 
 from numpy.typing import ArrayLike
 
+from face_plugin.cloud import Cloud
 from face_plugin.params import ALPHAS, Params
+from face_plugin.plane import refuse_in_plane
 from face_plugin.sculpt.file import SculptFile
 from face_plugin.sculpt.sculptor import Edit, Sculptor
 
@@ -39,6 +41,7 @@ class Sculptable(ABC):
     """
 
     params: Params
+    cloud: Cloud
     _sculptor: Sculptor
 
     def add_charges(self, positions: ArrayLike, *, alpha: float | None = None) -> tuple[Edit, ...]:
@@ -67,6 +70,7 @@ class Sculptable(ABC):
             A position is not finite, inside a ball, or on or outside the box, or `alpha` is not in (0, 1). No
             edit is made then.
         """
+        refuse_in_plane(self.cloud.points, charges=positions)
         level = self.proxy_level if alpha is None else float(Params(alpha=alpha).alpha)
         edits = self._sculptor.add_charges(positions, level)
         self._follow()
@@ -92,6 +96,7 @@ class Sculptable(ABC):
         ValueError
             As `add_charges`; or a radius is not positive, or a charge lies within it. No edit is made then.
         """
+        refuse_in_plane(self.cloud.points, cage_points=positions)
         edits = self._sculptor.add_cage_points(positions, radius)
         self._follow()
         return edits

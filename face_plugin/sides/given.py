@@ -20,8 +20,8 @@ FOUND = 3.0
 BESIDE_TRUST = 0.05
 
 
-def given_lines(normals: ArrayLike, count: int) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-    """Return normals as an (n, 3) floating-point array, and the unit lines (n, 3) that they lie on.
+def given_lines(normals: ArrayLike, count: int, dimension: int = 3) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    """Return normals as an (n, d) floating-point array, and the unit lines (n, d) that they lie on.
 
     Raises
     ------
@@ -34,9 +34,9 @@ def given_lines(normals: ArrayLike, count: int) -> tuple[NDArray[np.floating], N
     array([[0., 0., 1.]])
     """
     array = np.asarray(normals)
-    if array.shape != (count, 3) or array.dtype.kind not in "fiu":
+    if array.shape != (count, dimension) or array.dtype.kind not in "fiu":
         raise ValueError(
-            f"normals must be ({count}, 3) numbers, one for each point, found {array.shape} of {array.dtype}"
+            f"normals must be ({count}, {dimension}) numbers, one for each point, found {array.shape} of {array.dtype}"
         )
     if array.dtype.kind != "f":
         array = array.astype(np.float64)
@@ -84,7 +84,7 @@ def sides_of_lines(
         Of the m distinct points.
     rows : (n,) intp
         The distinct point that each input point became.
-    lines : (n, 3) float64
+    lines : (n, d) float64
         Unit normals of either sign, in the axes of `around`.
     evidence : (n,) float64
         Positive where a line points to free space, negative where away from it; at most 1 in size.

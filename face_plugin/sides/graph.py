@@ -29,13 +29,13 @@ class Edges:
 
 
 def neighbours_around(around: Neighbourhood, lines: NDArray[np.float64]) -> Edges:
-    """Join each point to its nearest neighbour in each sector of its tangent plane.
+    """Join each point to its nearest neighbour in each sector of its tangent plane, in the plane ahead and back.
 
     Parameters
     ----------
     around : Neighbourhood
         Of n points.
-    lines : (n, 3) float64
+    lines : (n, d) float64
         Unit normals of the tangent planes, of either sign.
 
     Returns
@@ -53,6 +53,9 @@ def neighbours_around(around: Neighbourhood, lines: NDArray[np.float64]) -> Edge
     count = len(around)
     found = np.full((count, SECTORS), -1, dtype=np.intp)
     points, neighbour = around.points, np.ascontiguousarray(around.neighbour)
+    if around.plane:
+        # The plane is one of space: of the sectors of a tangent plane two remain.
+        points, lines = (np.column_stack([of, np.zeros(count)]) for of in (points, lines))
 
     def run(rows: slice) -> None:
         _nearest_in_sectors(rows.start, rows.stop, points, lines, neighbour, found)
@@ -76,7 +79,7 @@ def couplings(points: NDArray[np.float64], lines: NDArray[np.float64], edges: Ed
 
     Parameters
     ----------
-    points, lines : (n, 3) float64
+    points, lines : (n, d) float64
     edges : Edges
 
     Returns

@@ -66,7 +66,7 @@ def bulk(points: NDArray[np.float64], neighbour: NDArray[np.intp]) -> NDArray[np
     """
     near = points[neighbour[:, : BULK_NEIGHBOURS + 1]]
     offset = near - near.mean(axis=1, keepdims=True)
-    low, middle, _ = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", offset, offset)).T
+    low, middle = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", offset, offset)).T[:2]
     # Points on one line have no extent in either direction: as far from a sheet as can be.
     return np.asarray(np.where(middle > 0, np.maximum(low, 0.0) / np.where(middle > 0, middle, 1.0), 1.0))
 

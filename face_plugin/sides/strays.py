@@ -23,6 +23,8 @@ __all__ = ["find_strays", "without"]
 # A stray's spacing is more than this many times the median spacing among its neighbours. At random on one surface the
 # largest of 20,000 is 2.2 times as large.
 LONELY = 4.0
+# The same on a curve, where each has two neighbours and gaps are as long as chance has it.
+LONELY_ON_CURVE = 7.0
 # Lonely points that form a sheet of their own are no strays: `bulk` among them is below this, for most of those near.
 SHEET = 0.12
 
@@ -38,7 +40,7 @@ def find_strays(around: Neighbourhood) -> NDArray[np.bool_]:
     array([500, 501])
     """
     typical = np.median(around.spacing[around.neighbour[:, 1:]], axis=1)
-    lonely = around.spacing > LONELY * typical
+    lonely = around.spacing > (LONELY_ON_CURVE if around.plane else LONELY) * typical
     rows = np.flatnonzero(lonely)
     if len(rows) > BULK_NEIGHBOURS:
         # A sparse sheet beside a dense one: its points are lonely there, and near one another.
@@ -48,7 +50,7 @@ def find_strays(around: Neighbourhood) -> NDArray[np.bool_]:
         lonely[rows[flat & (among.spacing < LONELY * around.spacing[rows])]] = False
     # What is left must have something to be a stray of: not a few points, nor points on a line.
     rest = around.points[~lonely]
-    spread = np.linalg.eigvalsh(np.cov(rest.T))[1] if len(rest) > BULK_NEIGHBOURS else 0.0
+    spread = np.linalg.eigvalsh(np.cov(rest.T))[-2] if len(rest) > BULK_NEIGHBOURS else 0.0
     return lonely & (spread > np.finfo(float).eps)
 
 
@@ -76,7 +78,7 @@ def without(whole: cloud.Cloud, points: ArrayLike, left_out: NDArray[np.bool_]) 
     >>> len(rest.points), bool(rest.rows[6] == rest.rows[0])
     (6, True)
     """
-    array = cloud.as_points(points)
+    array = cloud.as_points(points, dimensions=cloud.SPACE_OR_PLANE)
     kept = cloud.prepare(array[~left_out])
     rows = np.empty(whole.size, dtype=np.intp)
     rows[~left_out] = kept.rows

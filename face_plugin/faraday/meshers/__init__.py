@@ -12,20 +12,20 @@ __all__ = ["CageMesh"]
 
 @dataclass(frozen=True)
 class CageMesh:
-    """Tetrahedral mesh of the box minus the balls.
+    """Tetrahedral mesh of the box minus the balls; in the plane a mesh of triangles.
 
     Coordinates are those of the canonical frame (see `face_plugin.cloud`).
     """
 
     vertices: NDArray[np.float64]
-    """(m, 3) vertices."""
+    """(m, d) vertices; d is 3, or 2 in the plane."""
     tets: NDArray[np.int32]
-    """(t, 4) tetrahedra, positively oriented; none lies inside a ball."""
+    """(t, d + 1) tetrahedra or triangles, positively oriented; none lies inside a ball."""
     owner: NDArray[np.int32]
     """(m,) index of the ball that a vertex belongs to, -1 where it belongs to none."""
     boundary: NDArray[np.bool_]
     """(m,) whether a vertex lies on the box."""
     lower: NDArray[np.float64]
-    """(3,) lower corner of the box."""
+    """(d,) lower corner of the box."""
     upper: NDArray[np.float64]
-    """(3,) upper corner of the box."""
+    """(d,) upper corner of the box."""

@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 from face_plugin.compiled import compiled
 from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box
+from face_plugin.faraday.triangles import oriented_triangles, triangle_areas
 
 __all__ = [
     "Boundary",
@@ -40,13 +41,15 @@ class Boundary:
 
 
 def tet_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Signed volumes (t,) of tetrahedra.
+    """Signed volumes (t,) of tetrahedra, or areas of triangles.
 
     Examples
     --------
     >>> tet_volumes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]], dtype=np.int32)).round(3)
     array([0.167])
     """
+    if vertices.shape[1] == 2:
+        return triangle_areas(vertices, tets)
     first, *others = (vertices[column] for column in tets.T)
     a, b, c = (other - first for other in others)
     return np.asarray(np.einsum("td,td->t", np.cross(a, b), c) / 6.0)
@@ -57,6 +60,8 @@ def oriented(
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Tetrahedra (k, 4) turned positive, without those whose least height is at most `flat`, and their volumes (k,).
 
+    Triangles (k, 3) of the plane alike.
+
     The vertex with the shortest edges comes first: differences from the far end of a needle would lose its
     volume, and with it its stiffness, to rounding.
 
@@ -65,6 +70,8 @@ def oriented(
     >>> oriented(np.vstack([np.zeros(3), np.eye(3)]), np.array([[1, 0, 2, 3]], dtype=np.int32), 1e-14)[0]
     array([[0, 1, 2, 3]], dtype=int32)
     """
+    if vertices.shape[1] == 2:
+        return oriented_triangles(vertices, tets, flat)
     tets = np.array(tets, order="C")
     volume, height = np.empty((2, len(tets)))
     _turn(vertices, tets, volume, height)
@@ -128,7 +135,7 @@ def faces_of_solid(balls: Balls) -> NDArray[np.int32]:
 
 
 def ball_volumes(balls: Balls) -> NDArray[np.float64]:
-    """Volume (b,) of each ball's solid.
+    """Volume (b,) of each ball's solid, or area of its polygon.
 
     Examples
     --------
@@ -138,7 +145,7 @@ def ball_volumes(balls: Balls) -> NDArray[np.float64]:
     True
     """
     unit = (balls.vertices[0] - balls.centres[0]) / balls.radii[0]
-    return np.asarray(ConvexHull(unit).volume * balls.radii**3)
+    return np.asarray(ConvexHull(unit).volume * balls.radii ** unit.shape[1])
 
 
 def boundary_surface(balls: Balls, box: Box) -> Boundary:

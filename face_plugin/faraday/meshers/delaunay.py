@@ -82,7 +82,8 @@ def delaunay_mesh(balls: Balls, filling: Filling, box: Box, library: Library | N
     4
     """
     count, solid = balls.vertices.shape[:2]
-    vertices = np.concatenate([balls.vertices.reshape(-1, 3), filling.inner, filling.outer])
+    dimension = balls.centres.shape[1]
+    vertices = np.concatenate([balls.vertices.reshape(-1, dimension), filling.inner, filling.outer])
     owner = np.full(len(vertices), -1, dtype=np.int32)
     owner[: count * solid] = np.repeat(np.arange(count, dtype=np.int32), solid)
     flat = FLATTEST * float((box.upper - box.lower).max())
@@ -100,13 +101,13 @@ def delaunay_mesh(balls: Balls, filling: Filling, box: Box, library: Library | N
 
 
 def tetrahedralize(points: NDArray[np.float64], library: Library | None = None) -> NDArray[np.int32]:
-    """Delaunay tetrahedra (t, 4) of points (m, 3), of either orientation.
+    """Delaunay tetrahedra (t, 4) of points (m, 3), of either orientation; triangles (t, 3) of points (m, 2).
 
     Parameters
     ----------
-    points : (m, 3) float64
+    points : (m, d) float64
     library : {"gmsh", "scipy"}, optional
-        By default gmsh, or SciPy where gmsh cannot be loaded.
+        By default gmsh, or SciPy where gmsh cannot be loaded. In the plane it is SciPy.
 
     Raises
     ------
@@ -120,7 +121,7 @@ def tetrahedralize(points: NDArray[np.float64], library: Library | None = None) 
     """
     if library is None:
         library = "gmsh" if gmsh_loads() else "scipy"
-    return _by_gmsh(points) if library == "gmsh" else _by_scipy(points)
+    return _by_gmsh(points) if library == "gmsh" and points.shape[1] == 3 else _by_scipy(points)
 
 
 def _by_scipy(points: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -120,7 +120,8 @@ def build_mesh(
     3
     """
     failures = []
-    for name in _candidates(params.mesher, len(balls.radii)):
+    flat = balls.centres.shape[1] == 2
+    for name in _in_plane(params.mesher) if flat else _candidates(params.mesher, len(balls.radii)):
         mesher = MESHERS[name]
         try:
             gate.check_balls(balls, spacing, box, smallest=mesher.smallest, gap=mesher.gap, clearance=mesher.clearance)
@@ -139,6 +140,13 @@ def build_mesh(
                 log.warning("the mesh was made by %s instead", name)
             return mesh
     raise MeshingError("; ".join(failures))
+
+
+def _in_plane(mesher: str) -> list[str]:
+    """Meshers to try in the plane: the others make tetrahedra."""
+    if mesher not in ("auto", "delaunay"):
+        raise ValueError(f"mesher must be 'auto' or 'delaunay' for points in the plane, found {mesher!r}")
+    return ["scipy"]
 
 
 def _candidates(mesher: str, count: int) -> list[str]:

@@ -1,0 +1,122 @@
+"""The winding number of oriented points in the plane: a sum of dipoles, by the tree of `face_plugin.winding`.
+
+Of points p_j on curves, with normals n_j and lengths a_j, it is
+
+    w(x) = 1 / (2 pi) sum_j a_j n_j . (p_j - x) / |p_j - x|^2:
+
+the sum of the angles under which the pieces are seen, over a full turn. 1 inside, 0 outside, 1/2 on the curve.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.compiled import compiled
+from face_plugin.threads import in_threads
+from face_plugin.winding import OPENING, STACK, DipoleTree
+
+__all__ = ["PlaneTree"]
+
+
+class PlaneTree(DipoleTree):
+    """Points of the plane with lengths; the same calls and factors as in space.
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        In an order in which neighbours are near, such as Morton order; any order gives the same result, slower.
+    lengths : (n,) float64, in the unit of the points
+
+    Examples
+    --------
+    >>> angle = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
+    >>> circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    >>> tree = PlaneTree(circle, np.full(100, 2.0 * np.pi / 100))
+    >>> tree.number(circle, np.full(2, 1e-3), np.array([[0.0, 0.0], [2.0, 0.0]])).round(2) + 0.0
+    array([1., 0.])
+    """
+
+    def __init__(self, points: NDArray[np.float64], lengths: NDArray[np.float64]) -> None:
+        super().__init__(np.column_stack([points, np.zeros(len(points))]), lengths)
+
+    def outward(
+        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
+    ) -> NDArray[np.float64]:
+        """Steepest descent of the winding number (n, 2), times 4 pi; as in space."""
+        return self._evaluate(normals, eps, opening)[:, :2]
+
+    def outward_and_number(
+        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`outward` (n, 2) and `number` (n,) at the points, which cost no more together than one alone."""
+        columns = self._evaluate(normals, eps, opening)
+        return columns[:, :2], columns[:, 3] / (4.0 * np.pi)
+
+    def _evaluate(
+        self,
+        normals: NDArray[np.float64],
+        eps: NDArray[np.float64],
+        opening: float,
+        positions: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Columns of -4 pi grad w, the third of zeros, and 4 pi w."""
+        dipoles = np.ascontiguousarray(normals * self.areas[:, None])
+        # A node is a run of the order: its moment is a difference of running sums.
+        running = np.concatenate([np.zeros((1, 2)), np.cumsum(dipoles, axis=0)])
+        moments = running[self._stop] - running[self._start]
+        themselves = positions is None
+        queries = self.points if positions is None else np.ascontiguousarray(positions)
+        out = np.zeros((len(queries), 4))
+
+        def run(rows: slice) -> None:
+            _sums(
+                rows.start, rows.stop, queries, themselves, self.points, dipoles, eps, self._start, self._stop,
+                self._child, self._centre, self._radius, moments, opening, np.empty(STACK, dtype=np.int64), out,
+            )  # fmt: skip
+
+        in_threads(run, len(queries))
+        return out
+
+
+@compiled(nogil=True, error_model="numpy")
+def _sums(  # type: ignore[no-untyped-def]
+    first, last, queries, themselves, points, dipoles, eps, start, stop, child, centre, radius, moments, opening,
+    stack, out,
+):  # fmt: skip
+    """Walk down the tree for each query: -2 pi grad w = sum_j m_j / r^2 - 2 (m_j . d) d / r^4, twice for 4 pi."""
+    for i in range(first, last):
+        if eps[i] == 0.0:
+            continue
+        x, y, squared = queries[i, 0], queries[i, 1], eps[i] * eps[i]
+        gx, gy, w = 0.0, 0.0, 0.0
+        stack[0] = 0
+        top = 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            dx, dy = centre[node, 0] - x, centre[node, 1] - y
+            distance = math.sqrt(dx * dx + dy * dy)
+            if radius[node] < opening * distance:
+                inverse = 1.0 / (dx * dx + dy * dy + squared)
+                along = (dx * moments[node, 0] + dy * moments[node, 1]) * inverse
+                w += along
+                gx += moments[node, 0] * inverse - 2.0 * along * inverse * dx
+                gy += moments[node, 1] * inverse - 2.0 * along * inverse * dy
+            elif child[node] >= 0:
+                stack[top] = child[node]
+                stack[top + 1] = child[node] + 1
+                top += 2
+            else:
+                for k in range(start[node], stop[node]):
+                    if themselves and k == i:
+                        continue
+                    dx, dy = points[k, 0] - x, points[k, 1] - y
+                    inverse = 1.0 / (dx * dx + dy * dy + squared)
+                    along = (dx * dipoles[k, 0] + dy * dipoles[k, 1]) * inverse
+                    w += along
+                    gx += dipoles[k, 0] * inverse - 2.0 * along * inverse * dx
+                    gy += dipoles[k, 1] * inverse - 2.0 * along * inverse * dy
+        out[i, 0], out[i, 1], out[i, 3] = 2.0 * gx, 2.0 * gy, 2.0 * w

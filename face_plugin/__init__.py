@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from face_plugin.estimate import estimate_normals, orient_normals, reconstruct
     from face_plugin.execution import Execution
     from face_plugin.params import Params
-    from face_plugin.result import Result, Surface
+    from face_plugin.result import Result, Side, Surface
     from face_plugin.solver import FaCE
 
 __version__ = "0.2.0"
@@ -31,6 +31,7 @@ __all__ = [
     "MissingDependencyError",
     "Params",
     "Result",
+    "Side",
     "Surface",
     "estimate_normals",
     "orient_normals",
@@ -45,6 +46,7 @@ _HOME = {
     "MissingDependencyError": "errors",
     "Params": "params",
     "Result": "result",
+    "Side": "result",
     "Surface": "result",
     "estimate_normals": "estimate",
     "orient_normals": "estimate",

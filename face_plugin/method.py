@@ -28,6 +28,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
 from face_plugin.sides.enclosure import DARK
+from face_plugin.sides.parts import open_parts, parts
 from face_plugin.sides.patches import Planes, planes_of, turned_patches
 from face_plugin.sides.sensors import resettled, sides_by_sensors
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
@@ -250,9 +251,12 @@ def _sides_by_field(
     # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
     # Of a cloud seen in part, what is sealed off is not judged by how it fits in: most of that is not there.
     reached = field.strength > DARK if still.any() else None
+
+    def field_says(normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(field.lean * np.einsum("nd,nd->n", votes, normals))
+
     for along in (planes, None, None):
-        field_says = field.lean * np.einsum("nd,nd->n", votes, side)
-        turned = turned_patches(around, unit(side), field_says, planes=along, reached=reached) & ~kept
+        turned = turned_patches(around, unit(side), field_says(side), planes=along, reached=reached) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
         elif along is None:
@@ -261,4 +265,8 @@ def _sides_by_field(
     if is_open(field.difference) and not kept.any():
         # Parts of an open scan that no sheet joins learn of one another where both are seen.
         side = sides_from_vantage(around, side, planes)
+        # Of the two sides that leaves, closed bodies among the parts know theirs.
+        closed = ~open_parts(parts(around, unit(side)), field)
+        if field_says(side)[closed].sum() < 0:
+            side = -side
     return side

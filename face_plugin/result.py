@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import logging
 from dataclasses import dataclass, field
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from face_plugin.errors import FaceError
 from face_plugin.params import Params
 
-__all__ = ["Mesh", "Result", "Surface", "kept_points"]
+__all__ = ["Mesh", "Result", "Side", "Surface", "kept_points"]
 
 log = logging.getLogger(__name__)
 
@@ -19,6 +20,31 @@ log = logging.getLogger(__name__)
 MANY = 0.25
 # Fewest points that a surface is made from.
 FEWEST = 4
+
+
+class Side(enum.IntEnum):
+    """What told the side of normals: a value of `Result.sides`.
+
+    Examples
+    --------
+    >>> sides = np.array([1, 1, 0], dtype=np.uint8)
+    >>> sides == Side.FIELD
+    array([ True,  True, False])
+    >>> Side(sides[2]).name
+    'CHOSEN'
+    """
+
+    CHOSEN = 0
+    """Nothing: an open part that no sensor saw. Its normals are on one side; which one is a guess."""
+    FIELD = 1
+    """The field: the part encloses something, and its normals point away from that."""
+    SENSORS = 2
+    """Sensors saw the part, and its normals face them."""
+
+    @staticmethod
+    def count(sides: NDArray[np.uint8]) -> dict[str, int]:
+        """How many of the points (n,) have each side: by name, in lower case."""
+        return {side.name.lower(): int(np.count_nonzero(sides == side)) for side in Side}
 
 
 @dataclass(frozen=True)
@@ -44,6 +70,9 @@ class Result:
     open: NDArray[np.bool_]
     """(n,) whether the point is of an open part of the cloud, one that encloses nothing, such as a floor: the field is
     alike on both of its sides. Connected points have the same value."""
+    sides: NDArray[np.uint8]
+    """(n,) what told the side of the normal: 0 nothing, so that it was chosen, 1 the field, 2 sensors; see `Side`.
+    Connected points have the same value."""
 
     @property
     def kept(self) -> NDArray[np.bool_]:

@@ -27,7 +27,7 @@ from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.given import checked_trust, given_lines, sides_of_lines
-from face_plugin.sides.parts import open_parts, parts
+from face_plugin.sides.parts import open_parts, parts, told_by
 from face_plugin.sides.sensors import Sensors, sights
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.strays import find_strays, without
@@ -79,9 +79,20 @@ class Reading:
         return confidence(self.around, witness(self.seen.votes, self.sights), self.normals)
 
     @cached_property
+    def part(self) -> NDArray[np.intp]:
+        """Which connected part each distinct point (m,) belongs to."""
+        return parts(self.around, self.normals)
+
+    @cached_property
     def open(self) -> NDArray[np.bool_]:
         """Which distinct points (m,) are of parts that enclose nothing."""
-        return open_parts(parts(self.around, self.normals), self.seen)
+        return open_parts(self.part, self.seen)
+
+    @cached_property
+    def sides(self) -> NDArray[np.uint8]:
+        """What told the sides (m,) of the normals."""
+        seen = None if self.sights is None else np.asarray(self.sights.any(axis=1))
+        return told_by(self.part, self.open, self.normals, self.seen, seen)
 
     def threshold(self, alpha: float | str) -> float:
         """Alpha as a number, which "auto" derives from the leak of the cage."""
@@ -259,6 +270,7 @@ class FaCE(Sculptable):
             confidence=np.where(self.strays, 0.0, self._reading.confidence[rows]).astype(dtype),
             strays=self.strays,
             open=self.open,
+            sides=self._reading.sides[rows],
             interior=self.interior() if filter_interior else None,
             timings=dict(self.timings),
             params=params,

@@ -34,7 +34,7 @@ def with_sensors(layer: PointSet, sensors: Sensors | None) -> PointSet:
 
 @dataclass(frozen=True)
 class Normals(Filter):
-    """Give the kept points outward unit normals, and the attributes ``strength`` and ``confidence``.
+    """Give the kept points outward unit normals; attributes: ``strength``, ``confidence``, ``open`` and ``sides``.
 
     Parameters
     ----------
@@ -85,5 +85,6 @@ class Normals(Filter):
             "strength": layer.scatter(result.strength),
             "confidence": layer.scatter(result.confidence),
             "open": layer.scatter(result.open),
+            "sides": layer.scatter(result.sides),
         }
         return layer.replace(normals=layer.scatter(result.normals), attributes=attributes, cage=cage)

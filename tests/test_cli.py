@@ -58,7 +58,7 @@ def test_normals_point_outward_and_the_rest_is_kept(ball: Path, capfd: pytest.Ca
     assert ((cloud.normals * BALL.normals).sum(axis=1) > 0.5).all()
     np.testing.assert_array_equal(cloud.attributes["label"], np.arange(600))
     assert (cloud.attributes["strength"] > 0).all()
-    assert set(cloud.attributes) == {"label", "strength", "confidence"}
+    assert set(cloud.attributes) == {"label", "strength", "confidence", "sides"}
 
 
 def test_the_input_may_be_the_output(ball: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -9,16 +9,19 @@ from scipy.sparse.csgraph import connected_components
 
 from face_plugin.faraday.gradient import ROUNDING, FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.result import Side
 from face_plugin.sides.graph import couplings, neighbours_around
 from face_plugin.sides.vantage import FEWEST, is_open
 
-__all__ = ["open_parts", "parts"]
+__all__ = ["open_parts", "parts", "told_by"]
 
-# Neighbours farther apart than this many spacings are not of one part: scan lines are, seven times as far apart as the
-# points along them.
+# Spacings from which neighbours are not of one part, times the square of what couples them. Within a plane scan lines
+# are of one part, seven times as far apart as the points along them; across a right angle, where the coupling is 0.2 to
+# 0.5, only the nearest points are: what lies farther is another sheet.
 REACH = 8.0
-# Nor those whose coupling is weaker than this: one stands over the other. Across a right angle it is 0.2 to 0.5.
-COUPLED = 0.2
+# Share of the points of a part from which it counts as seen, closed and open: through the gaps of a sheet of points at
+# random sensors seem to see a seventh of what lies behind, and the field tells a closed part's side without them.
+SEEN_CLOSED, SEEN_OPEN = 0.2, 0.01
 
 
 def parts(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -39,8 +42,8 @@ def parts(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.int
     """
     edges = neighbours_around(around, normals)
     length = np.linalg.norm(around.points[edges.first] - around.points[edges.second], axis=1)
-    near = length < REACH * np.maximum(around.spacing[edges.first], around.spacing[edges.second])
-    joined = near & (np.abs(couplings(around.points, normals, edges)) > COUPLED)
+    spacing = np.maximum(around.spacing[edges.first], around.spacing[edges.second])
+    joined = length < REACH * spacing * couplings(around.points, normals, edges) ** 2
     ends = (edges.first[joined], edges.second[joined])
     link = coo_matrix((np.ones(len(ends[0])), ends), shape=(len(around), len(around)))
     return np.asarray(connected_components(link, directed=False)[1], dtype=np.intp)
@@ -74,3 +77,38 @@ def open_parts(part: NDArray[np.intp], field: FieldAtPoints) -> NDArray[np.bool_
     for large in np.flatnonzero(count > FEWEST):
         opened[large] = is_open(difference[part == large])
     return opened[part]
+
+
+def told_by(
+    part: NDArray[np.intp],
+    opened: NDArray[np.bool_],
+    normals: NDArray[np.float64],
+    field: FieldAtPoints,
+    seen: NDArray[np.bool_] | None = None,
+) -> NDArray[np.uint8]:
+    """Find what told the sides of normals: a `Side` (n,), the same for all points of a part.
+
+    Parameters
+    ----------
+    part, opened
+        As of `parts` and `open_parts`.
+    normals : (n, 3) float64
+    field : FieldAtPoints
+    seen : (n,) bool, optional
+        Which points sensors saw.
+
+    Examples
+    --------
+    >>> up = np.tile([0.0, 0.0, 1.0], (4, 1))
+    >>> field = FieldAtPoints(np.ones(4), up, np.ones(4))
+    >>> told_by(np.array([0, 1, 2, 2]), np.array([1, 1, 0, 0]) > 0, up, field, np.array([1, 0, 0, 0]) > 0)
+    array([2, 0, 1, 1], dtype=uint8)
+    """
+    count = np.bincount(part)
+    # Of a closed part the field is not believed where sensors that saw others speak against it.
+    agreed = np.bincount(part, field.difference * np.einsum("nd,nd->n", field.votes, normals))
+    closed = np.bincount(part, opened) == 0
+    side = np.where(closed & (agreed >= 0), Side.FIELD, Side.CHOSEN).astype(np.uint8)
+    if seen is not None:
+        side[np.bincount(part, seen) > np.where(closed, SEEN_CLOSED, SEEN_OPEN) * count] = Side.SENSORS
+    return side[part]

@@ -20,6 +20,7 @@ from face_plugin.io.disk import claimed
 from face_plugin.io.sinks import WRITERS, Columns
 from face_plugin.io.sources import STREAMED, Source, open_source
 from face_plugin.params import Params, settled
+from face_plugin.result import Side
 from face_plugin.sides.sensors import Sensors
 from face_plugin.stages import Progress
 from face_plugin.tiles.plan import PROCESS_BYTES, SHARE
@@ -51,6 +52,8 @@ class FileResult:
     strays: int
     """Points too far from everything to belong to a surface."""
     mean_confidence: float
+    sides: dict[str, int]
+    """Points by what told their side: chosen, field, sensors."""
     timings: dict[str, float]
     """Seconds by stage."""
     params: Params
@@ -105,7 +108,7 @@ def normals_of_file(
     mark_interior : bool
         Write whether each point is inside, as ``interior`` (0 or 1).
     scalars : bool
-        Write ``strength`` and ``confidence`` of each point.
+        Write ``strength``, ``confidence`` and ``sides`` of each point.
     execution : Execution, optional
     resume : bool
         Go on from what an interrupted run left.
@@ -163,7 +166,7 @@ def normals_of_file(
         parts = columns_of(opened, found, extra, keep=keep, chunk=chunk)
         with replacing(output) as temporary:
             WRITERS[output.suffix.lower()](temporary, written, parts, opened)
-        mean_confidence = float(found["confidence"].mean())
+        mean_confidence, sides = float(found["confidence"].mean()), Side.count(found["sides"])
         report("write", 1.0)
         # The folder can be removed where nothing in it is mapped any more.
         del found, parts
@@ -173,6 +176,7 @@ def normals_of_file(
         interior=inside,
         strays=strays,
         mean_confidence=mean_confidence,
+        sides=sides,
         timings=timings,
         params=params,
     )
@@ -200,7 +204,7 @@ def _working(folder: Path, output: Path, resume: bool) -> Iterator[None]:
 
 
 def _extras(scalars: bool, mark_interior: bool) -> list[tuple[str, bool]]:
-    return [("strength", scalars), ("confidence", scalars), ("interior", mark_interior)]
+    return [("strength", scalars), ("confidence", scalars), ("sides", scalars), ("interior", mark_interior)]
 
 
 def columns_of(

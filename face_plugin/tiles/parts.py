@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from face_plugin.cloud import morton_distinct
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.parts import open_parts, parts
+from face_plugin.sides.parts import open_parts, parts, told_by
 from face_plugin.threads import KDTree
 from face_plugin.tiles.store import Store
 
@@ -28,6 +28,8 @@ class Known:
     """(k, 3) in the canonical frame."""
     open: NDArray[np.bool_]
     """(k,) whether the part of each encloses nothing."""
+    sides: NDArray[np.uint8]
+    """(k,) what told the sides of its normals."""
 
     def nearest(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
         """Row (n,) of the coarse point that each point is taken for."""
@@ -42,7 +44,9 @@ def known_of(store: Store) -> Known:
     found = {name: values[order[leads]] for name, values in found.items()}
     part = parts(Neighbourhood(found["points"]), found["oriented"])
     field = FieldAtPoints(found["strength"], found["normals"], found["difference"])
-    return Known(found["points"], open_parts(part, field))
+    opened = open_parts(part, field)
+    seen = found["seen"] > 0 if "seen" in found else None
+    return Known(found["points"], opened, told_by(part, opened, found["oriented"], field, seen))
 
 
 def _of_tile(store: Store, tile: int) -> dict[str, NDArray[np.float64]]:
@@ -51,5 +55,10 @@ def _of_tile(store: Store, tile: int) -> dict[str, NDArray[np.float64]]:
     rows = field.pop("voxel_rows")
     sound = ~field.pop("stray")[rows]
     found = {name: values[rows[sound]] for name, values in field.items()}
-    oriented = store.read(tile, "normals", "normals")["normals"][rows[sound]]
-    return {"points": store.voxels(tile)[sound], "oriented": oriented, **found}
+    after = store.read(tile, "normals", "normals", *(() if store.sensors is None else ("seen",)))
+    found["oriented"] = after.pop("normals")[rows[sound]]
+    return {
+        "points": store.voxels(tile)[sound],
+        **found,
+        **{name: values[rows[sound]] for name, values in after.items()},
+    }

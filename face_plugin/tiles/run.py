@@ -102,6 +102,7 @@ def estimate_tiled(
             params=params,
             strays=found["strays"],
             open=found["open"],
+            sides=found["sides"],
         )
 
 
@@ -223,7 +224,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
     Returns
     -------
     dict of str to (n, ...) array
-        "normals", "strength", "confidence", "strays", "open", and "interior" where the store asks for it.
+        "normals", "strength", "confidence", "strays", "open", "sides", and "interior" where the store asks for it.
     """
     kinds: dict[str, tuple[Any, tuple[int, ...]]] = {
         "normals": (store.dtype, (store.count, 3)),
@@ -231,6 +232,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         "confidence": (store.dtype, (store.count,)),
         "strays": (np.bool_, (store.count,)),
         "open": (np.bool_, (store.count,)),
+        "sides": (np.uint8, (store.count,)),
     }
     if store.interior:
         kinds["interior"] = (np.bool_, (store.count,))
@@ -253,7 +255,8 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         out["confidence"][row] = oriented["confidence"]
         out["strength"][row] = solved["strength"]
         out["strays"][row] = solved["stray"]
-        out["open"][row] = known.open[known.nearest(store.tile_points(tile))]
+        like = known.nearest(store.tile_points(tile))
+        out["open"][row], out["sides"][row] = known.open[like], known.sides[like]
         if store.interior:
             inside = solved["level"] < alpha
             out["interior"][row] = inside & oriented["enclosed"] if store.params.alpha == "auto" else inside

@@ -27,7 +27,7 @@ from face_plugin.sides.sensors import Sensors
 
 __all__ = ["Store", "Subset"]
 
-VERSION = 4
+VERSION = 5
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,8 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         like = own.copy()
         like[stray] = sound[KDTree(seen.points[sound]).query(seen.points[own[stray]])[1]]
     found: dict[str, NDArray[np.generic]] = {"normals": normals[like]}
+    if seen_by is not None:
+        found["seen"] = np.asarray(seen_by.any(axis=1))[own]
     with clock("enclosure"):
         if store.interior:
             inside = enclosed(around, normals, seen.field.strength, seen.near)

@@ -14,6 +14,7 @@ from face_plugin.app.cli.sensors import add_sensors, sensors_in
 from face_plugin.execution import Execution
 from face_plugin.io import CLOUD_SUFFIXES, check_output, read_cloud, write_cloud
 from face_plugin.params import Params
+from face_plugin.result import Side
 
 __all__ = ["register"]
 
@@ -29,7 +30,9 @@ def register(commands: Any) -> None:
     )
     add_interior(parser, default=False)
     parser.add_argument("--mark-interior", action="store_true", help="write whether each point is inside (0 or 1)")
-    parser.add_argument("--scalars", action="store_true", help="write field strength and confidence of each point")
+    parser.add_argument(
+        "--scalars", action="store_true", help="write field strength, confidence and what told the side"
+    )
     parser.add_argument(
         "--resume",
         action="store_true",
@@ -63,13 +66,14 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     )
     extra: dict[str, NDArray[Any]] = {}
     if args.scalars:
-        extra.update({"strength": result.strength, "confidence": result.confidence})
+        extra.update({"strength": result.strength, "confidence": result.confidence, "sides": result.sides})
     inside = result.interior if result.interior is not None else np.zeros(len(cloud), dtype=np.bool_)
     if args.mark_interior:
         extra["interior"] = inside
     keep = result.kept if args.filter_interior else None
     with console.stage("write"):
         write_cloud(output, cloud, normals=result.normals, extra=extra, keep=keep)
+    sides = Side.count(result.sides)
     written = len(cloud) if keep is None else int(keep.sum())
     summary = {
         "input": args.input,
@@ -79,12 +83,13 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "strays": int(result.strays.sum()),
         "interior": int(inside.sum()) if wanted else None,
         "mean_confidence": float(result.confidence.mean()),
+        "sides": sides,
         "timings": result.timings,
         "params": result.params.to_dict(),
         "execution": execution.to_dict(),
     }
     dropped = f", {len(cloud) - written:,} interior points and strays left out" if keep is not None else ""
-    return summary, f"{output}: {written:,} points with normals{dropped}"
+    return summary, f"{output}: {written:,} points with normals{dropped}{_guessed(sides)}"
 
 
 def _in_parts(
@@ -116,9 +121,15 @@ def _in_parts(
         "strays": done.strays,
         "interior": done.interior,
         "mean_confidence": done.mean_confidence,
+        "sides": done.sides,
         "timings": done.timings,
         "params": params.to_dict(),
         "execution": execution.to_dict(),
     }
     dropped = f", {done.points - done.written:,} interior points and strays left out" if args.filter_interior else ""
-    return summary, f"{args.output}: {done.written:,} points with normals{dropped}"
+    return summary, f"{args.output}: {done.written:,} points with normals{dropped}{_guessed(done.sides)}"
+
+
+def _guessed(sides: dict[str, int]) -> str:
+    count = sides["chosen"]
+    return f"; the side of {count:,} is a guess: say --viewpoint or --up" if count else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from face_plugin.app.cli.options import (
     add_interior,
@@ -16,10 +16,8 @@ from face_plugin.app.cli.options import (
     surface_of,
 )
 from face_plugin.app.cli.sensors import add_sensors
+from face_plugin.result import Side, Surface
 from face_plugin.surface import is_closed
-
-if TYPE_CHECKING:
-    from face_plugin.result import Surface
 
 __all__ = ["add_reconstruction", "reconstruction_of", "summary_of"]
 
@@ -59,6 +57,8 @@ def summary_of(surface: Surface, args: argparse.Namespace, output: Path) -> tupl
         "vertices": len(surface.vertices),
         "faces": len(surface.faces),
         "closed": closed,
+        "open": int(result.open.sum()),
+        "sides": Side.count(result.sides),
         "timings": result.timings,
         "params": result.params.to_dict(),
         "execution": execution_of(args).to_dict(),

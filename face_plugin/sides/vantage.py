@@ -3,10 +3,12 @@
 From any place that is not in matter, all that is visible faces it; from within matter nothing is seen, or all that is
 seen faces away. So what is visible from one place lies on one side as a whole, and parts that no sheet joins, such as
 a roof and the ground beside it, or a box and the floor behind it, learn of one another. Places tried are those that
-scans are taken from: far off along the axes, and the emptiest place within.
+see most of a small part of the points: the sensor of a single view is one of them.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,6 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.sensors import SIGHT, Sensors, facing, sights
-from face_plugin.threads import KDTree
 
 __all__ = ["is_open", "sides_from_vantage"]
 
@@ -26,9 +27,12 @@ SHIELDED = 0.92
 # Fewer points show no sheet that could be open.
 FEWEST = 100
 # A place counts where it sees most of the points, face on: share of points, times the cosine, times how many agree.
-WORTH = 0.6
-# Cells along each axis among which the emptiest place is looked for.
-GRID = 14
+WORTH = 0.5
+# Points that places are looked for with, and how many of the best are then tried with all points.
+LOOKED_WITH = 700
+TRIED = 2
+# First steps of a place towards a better one, and the last, as fractions of the cloud's extent.
+STEPS = (0.4, 0.2, 0.1, 0.05)
 
 
 def is_open(difference: NDArray[np.float64]) -> bool:
@@ -61,7 +65,7 @@ def sides_from_vantage(
     """
     lines, edges, coupling = planes or planes_of(around)
     best, score = None, WORTH
-    for place in _places(around.points):
+    for place in _places(around.points, lines):
         evidence = facing(lines, sights(around, place))
         # No more than what is seen at all: most places need no more looking at.
         if np.abs(evidence).mean() <= score:
@@ -76,15 +80,39 @@ def sides_from_vantage(
     return np.asarray(normals * (side if side.sum() >= 0 else -side)[:, None])
 
 
-def _places(points: NDArray[np.float64]) -> list[Sensors]:
-    axes = [Sensors(up=sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)]
-    return [*axes, Sensors(_emptiest(points))]
+def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sensors]:
+    """Find the places that see the most of the points (n, 3), face on to their lines (n, 3), the best first.
 
+    Tried are 26 directions from afar, and places within the box and around it; the best of each then move for as long
+    as they get better, so that one near the sensor of a single view ends there.
+    """
+    some = np.unique(np.linspace(0, len(points) - 1, LOOKED_WITH).astype(np.intp))
+    around, few = Neighbourhood(points[some]), lines[some]
 
-def _emptiest(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Find the place (1, 3) within the box of the points that is farthest from all of them."""
+    def share(place: Sensors) -> float:
+        return float(np.abs(facing(few, sights(around, place))).mean())
+
+    steps = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
+    directions = steps[steps.any(axis=1)]
     lower, upper = points.min(axis=0), points.max(axis=0)
-    middles = (np.arange(GRID) + 0.5) / GRID
-    share = np.stack(np.meshgrid(middles, middles, middles, indexing="ij"), axis=-1).reshape(-1, 3)
-    place = lower + share * (upper - lower)
-    return np.asarray(place[[np.argmax(KDTree(points).query(place)[0])]])
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+    far = max(directions, key=lambda direction: share(Sensors(up=direction)))
+    starts = [middle + 0.5 * half * step for step in steps] + [middle + half.max() * step for step in directions]
+    starts = sorted(starts, key=lambda start: -share(Sensors(start)))[: TRIED - 1]
+    near = [_climbed(start, share, 2 * float(half.max())) for start in starts]
+    return sorted([Sensors(up=far), Sensors(up=-far), *map(Sensors, near)], key=lambda place: -share(place))[:TRIED]
+
+
+def _climbed(place: NDArray[np.float64], share: Callable[[Sensors], float], extent: float) -> NDArray[np.float64]:
+    """Move a place (3,) along the axes for as long as it sees more."""
+    best = share(Sensors(place))
+    for step in STEPS:
+        moved = True
+        while moved:
+            moved = False
+            for axis in np.eye(3):
+                for sign in (1.0, -1.0):
+                    tried = place + sign * step * extent * axis
+                    if (seen := share(Sensors(tried))) > best:
+                        place, best, moved = tried, seen, True
+    return place

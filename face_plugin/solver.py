@@ -129,16 +129,22 @@ class FaCE(Sculptable):
 
     Attributes
     ----------
-    cloud : Cloud
-        The distinct points in the canonical frame, in which `balls`, `mesh` and `poisson` are as well; `frame` is the
-        way between it and the input. What methods take and return is in the coordinates of the input.
-    balls : Balls
+    params : Params
+    execution : Execution
+    timings : dict of str to float
+        Seconds by stage.
     strays : (n,) bool
         Input points that lie too far from everything to take part.
+    frame : Frame
+        The way between the coordinates of the input, which methods take and return unless they say otherwise, and the
+        canonical frame, which all that follows is in.
+    cloud : Cloud
+        The distinct points.
+    balls : Balls
     mesh : CageMesh
     poisson : Poisson
     vertex_strength : (m,) float64
-        E_max at the vertices of the mesh.
+        E_max at the vertices of the mesh, which is the same in both.
 
     Examples
     --------
@@ -212,7 +218,10 @@ class FaCE(Sculptable):
         return np.where(side[:, None] < 0, -given, given)
 
     def potential(self) -> NDArray[np.float64]:
-        """Potentials (m, d) at the vertices of the mesh: column k is that of a unit field along canonical axis k."""
+        """Potentials (m, d) at the vertices of the mesh: column k is that of a unit field along canonical axis k.
+
+        Of a field whose strength is 1 in the unit of the canonical frame.
+        """
         return self._sculptor.potential
 
     def strength(self, query: ArrayLike) -> NDArray[np.float64]:

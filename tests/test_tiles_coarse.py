@@ -1,4 +1,4 @@
-"""The coarse level: even points, and the transfer of its potential to the tiles."""
+"""The coarse cage: even points, and the transfer of its potential to the tiles."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The coarse level: a cage over the whole cloud whose potential becomes the boundary data of every tile."""
+"""The coarse cage: over the whole cloud, with a potential that becomes the boundary data of every tile."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def voxel_size(points: NDArray[np.float64], target: int) -> float:
 
 @dataclass(frozen=True)
 class Coarse:
-    """The solved coarse level."""
+    """The solved coarse cage."""
 
     mesh: CageMesh
     potential: NDArray[np.float64]
@@ -140,7 +140,7 @@ class Coarse:
 
     @classmethod
     def load(cls, folder: Path) -> Coarse:
-        """Read the coarse level of a store."""
+        """Read the coarse cage of a store."""
         with np.load(folder / "coarse.npz") as arrays:
             mesh = CageMesh(**{f.name: arrays[f.name] for f in dataclasses.fields(CageMesh)})
             return cls(mesh, arrays["potential"], arrays["cage_value"], Locator(mesh))

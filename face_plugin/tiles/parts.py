@@ -1,4 +1,4 @@
-"""Connected parts of a cloud in tiles: found among the points of the coarse level, which see all of it at once.
+"""Connected parts of a cloud in tiles: found among the points of the coarse cage, which see all of it at once.
 
 Parts nearer to one another than these points are count as one.
 """
@@ -22,7 +22,7 @@ __all__ = ["Known", "known_of"]
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of the parts, at the points of the coarse level."""
+    """What is known of the parts, at the points of the coarse cage."""
 
     points: NDArray[np.float64]
     """(k, 3) in the canonical frame."""
@@ -50,7 +50,7 @@ def known_of(store: Store) -> Known:
 
 
 def _of_tile(store: Store, tile: int) -> dict[str, NDArray[np.float64]]:
-    """Read what is known of the points of the coarse level that a tile owns, without strays."""
+    """Read what is known of the points of the coarse cage that a tile owns, without strays."""
     field = store.read(tile, "field", "voxel_rows", "stray", "strength", "normals", "difference")
     rows = field.pop("voxel_rows")
     sound = ~field.pop("stray")[rows]

@@ -26,7 +26,7 @@ SHARE = 0.5
 """Share of the free memory that tiles take unless `Execution.max_memory` says otherwise: others need some as well."""
 
 
-# Measured (docs/scaling.md): an interpreter with this package and a coarse level loaded, a point of a tile or of its
+# Measured (docs/scaling.md): an interpreter with this package and a coarse cage loaded, a point of a tile or of its
 # halo, and how much longer the halo makes the side of a tile, in spacings, where most sheets pass through it.
 PROCESS_BYTES = 0.26e9
 POINT_BYTES = 17.5e3

@@ -62,7 +62,7 @@ def fill_store(
     memory: float | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> tuple[Store, Voxels]:
-    """Sort a cloud into tiles on disk, and choose the points of the coarse level.
+    """Sort a cloud into tiles on disk, and choose the points of the coarse cage.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def fill_store(
     Returns
     -------
     Store
-        Not saved yet: that marks it as finished, and the coarse level is still missing.
+        Not saved yet: that marks it as finished, and the coarse cage is still missing.
     Voxels
 
     Raises

@@ -258,7 +258,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         like = known.nearest(store.tile_points(tile))
         out["open"][row], out["sides"][row] = known.open[like], known.sides[like]
         if store.interior:
-            inside = solved["level"] < alpha
+            inside = solved["e_max"] < alpha
             out["interior"][row] = inside & oriented["enclosed"] if store.params.alpha == "auto" else inside
     return out
 

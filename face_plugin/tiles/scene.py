@@ -53,7 +53,7 @@ class Scene:
 
 
 def write_far(store: Store) -> None:
-    """Bring together what the first stage found out at the points of the coarse level."""
+    """Bring together what the first stage found out at the points of the coarse cage."""
     parts = []
     for tile in range(store.tiles):
         found = store.read(tile, "field", "voxel_rows", "stray", *_FIELD)

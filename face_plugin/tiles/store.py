@@ -27,7 +27,7 @@ from face_plugin.sides.sensors import Sensors
 
 __all__ = ["Store", "Subset"]
 
-VERSION = 5
+VERSION = 6
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Store:
     key : str
         Hash of the input and the settings.
     voxel : float
-        Edge of the voxels of which the coarse level has a point each.
+        Edge of the voxels of which the coarse cage has a point each.
     plane : (3,) float64 or None
         The normal of a cloud that lies in one plane.
     sensors : Sensors or None
@@ -171,7 +171,7 @@ class Store:
             return np.asanyarray(np.load(self.folder / name, mmap_mode=mode))
 
     def voxels(self, tile: int) -> NDArray[np.float64]:
-        """Points (k, 3) of the coarse level that a tile owns."""
+        """Points (k, 3) of the coarse cage that a tile owns."""
         with _undamaged(self.folder / "voxels.npz"), np.load(self.folder / "voxels.npz") as arrays:
             return np.asarray(arrays["points"][arrays["tile"] == tile])
 

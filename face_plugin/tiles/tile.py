@@ -131,7 +131,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
             found = {name: values[place] for name, values in vars(sheets).items()}
         if store.interior:
             # Inside an isosurface is where the field is below its value, in the tile's box as everywhere.
-            found["level"] = Locator(solved.cage.mesh).interpolate(own, solved.strength)
+            found["e_max"] = Locator(solved.cage.mesh).interpolate(own, solved.strength)
     with clock("normals"):
         seen = field_at_points(solved.cage.mesh, solved.strength, solved.cage.balls, own)
         voxels = KDTree(own).query(store.voxels(tile))[1]

@@ -78,7 +78,7 @@ def turn_to_curves(around: Neighbourhood, normals: NDArray[np.float64], *, signe
     >>> from face_plugin.shapes.curves import star
     >>> shape = star(400)
     >>> found = turn_to_curves(Neighbourhood(shape.points), shape.normals, signed=True)
-    >>> bool(((found.normals * shape.normals).sum(axis=1) > 0.99).all())
+    >>> bool(((found.normals * shape.normals).sum(axis=1) > 0.98).all())
     True
     """
     fits = fit_curves(around, normals, signed=signed)

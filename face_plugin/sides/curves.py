@@ -141,7 +141,7 @@ def curve_separation(around: Neighbourhood, cage_spacing: float | None, *, coars
     --------
     >>> from face_plugin.shapes.curves import circle
     >>> around = Neighbourhood(circle(100).points)
-    >>> bool((curve_separation(around, None) < 0.06).all()), curve_separation(around, 0.1)[0]
+    >>> bool((curve_separation(around, None) < 0.06).all()), float(curve_separation(around, 0.1)[0])
     (True, 0.1)
     """
     if cage_spacing is not None:

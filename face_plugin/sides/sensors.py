@@ -163,7 +163,7 @@ def visible(
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(2000).points
     >>> seen = visible(ball, Neighbourhood(ball).spacing, np.array([0.0, 0.0, 9.0]))
-    >>> bool(seen[ball[:, 2] > 0.3].all()), bool(seen[ball[:, 2] < -0.3].any())
+    >>> bool(seen[ball[:, 2] > 0.5].all()), bool(seen[ball[:, 2] < -0.3].any())
     (True, False)
     """
     offset = points - viewpoint

@@ -60,7 +60,7 @@ def sides_from_vantage(
     >>> mixed = np.outer(np.where(two[:, 2] > 1, -1.0, 1.0), [0.0, 0.0, 1.0])
     >>> mixed[:20] *= -1.0
     >>> turned = sides_from_vantage(Neighbourhood(two + 0.01 * np.sin(two[:, ::-1])), mixed)
-    >>> abs(turned[:, 2].mean())
+    >>> float(abs(turned[:, 2].mean()))
     1.0
     """
     lines, edges, coupling = planes or planes_of(around)

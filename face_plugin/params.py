@@ -25,6 +25,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "directions": ("exact", "icosahedron"),
     "solver": ("auto", "cholmod", "superlu"),
     "angles": ("refined", "field"),
+    "nested": ("solid", "cavity"),
     "inside": ("rays", "winding"),
 }
 
@@ -79,6 +80,10 @@ class Params:
     # Normals
     angles: Literal["refined", "field"] = "refined"
     """Normals refined from the points themselves, or the plain gradient of the field strength (the paper's)."""
+
+    nested: Literal["solid", "cavity"] = "solid"
+    """What a closed body within another is: one more solid, inside the object, or a cavity of it, whose wall faces
+    inward and is kept; a body in the cavity is solid again."""
 
     # Interior
     alpha: float | Literal["auto", "dense", "sparse"] = "auto"

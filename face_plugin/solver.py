@@ -27,6 +27,7 @@ from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.given import checked_trust, given_lines, sides_of_lines
+from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import open_parts, parts, told_by
 from face_plugin.sides.sensors import Sensors, sights
 from face_plugin.sides.sheets import Sheets
@@ -61,27 +62,47 @@ class Reading:
         return field_at_points(self.cage.mesh, self.strength, self.cage.balls, self.around.points)
 
     @cached_property
-    def normals(self) -> NDArray[np.float64]:
-        """Normals of the distinct points (m, d)."""
+    def as_solids(self) -> NDArray[np.float64]:
+        """Normals of the distinct points (m, d), before bodies within others are read as cavities."""
         with self.stage("normals"):
             return orient(self.around, self.seen, self.params, plane=self.plane, sheets=self.sheets, sights=self.sights)
+
+    @cached_property
+    def nesting(self) -> Nesting | None:
+        """Bodies within others, where they are cavities."""
+        if self.params.nested == "solid":
+            return None
+        return cavities(self.around, self.as_solids, self.part, self.looked_at)
+
+    @property
+    def looked_at(self) -> NDArray[np.bool_] | None:
+        """Which distinct points (m,) a sensor saw."""
+        return None if self.sights is None else np.asarray(self.sights.any(axis=1))
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Normals of the distinct points (m, d)."""
+        if self.nesting is None:
+            return self.as_solids
+        return np.where(self.nesting.turned[:, None], -self.as_solids, self.as_solids)
 
     @cached_property
     def enclosed(self) -> NDArray[np.bool_]:
         """Which distinct points (m,) the others enclose."""
         found = enclosure.enclosed(self.around, self.normals, self.seen.strength)
         # What a sensor saw does not lie inside anything.
-        return found if self.sights is None else found & ~self.sights.any(axis=1)
+        return found if self.looked_at is None else found & ~self.looked_at
 
     @cached_property
     def confidence(self) -> NDArray[np.float64]:
         """Confidence (m,) in the side of the normals."""
-        return confidence(self.around, witness(self.seen.votes, self.sights), self.normals)
+        # The field knows nothing of cavities.
+        return confidence(self.around, witness(self.seen.votes, self.sights), self.as_solids)
 
     @cached_property
     def part(self) -> NDArray[np.intp]:
         """Which connected part each distinct point (m,) belongs to."""
-        return parts(self.around, self.normals)
+        return parts(self.around, self.as_solids)
 
     @cached_property
     def open(self) -> NDArray[np.bool_]:
@@ -91,8 +112,7 @@ class Reading:
     @cached_property
     def sides(self) -> NDArray[np.uint8]:
         """What told the sides (m,) of the normals."""
-        seen = None if self.sights is None else np.asarray(self.sights.any(axis=1))
-        return told_by(self.part, self.open, self.normals, self.seen, seen)
+        return told_by(self.part, self.open, self.as_solids, self.seen, self.looked_at)
 
     def threshold(self, alpha: float | str) -> float:
         """Alpha as a number, which "auto" derives from the leak of the cage."""
@@ -104,6 +124,8 @@ class Reading:
         with self.stage("interior"):
             # What alpha is derived from decides as well.
             inside = self.enclosed.copy() if alpha == "auto" else np.ones(len(self.around), dtype=np.bool_)
+            if self.nesting is not None:
+                inside &= ~self.nesting.inner
             if self.around.plane:
                 # Each point has the field of the disc nearest to it: no isoline needs to be drawn.
                 inside &= self.seen.strength < level

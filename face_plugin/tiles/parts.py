@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from face_plugin.cloud import morton_distinct
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import open_parts, parts, told_by
 from face_plugin.threads import KDTree
 from face_plugin.tiles.store import Store
@@ -30,6 +31,8 @@ class Known:
     """(k,) whether the part of each encloses nothing."""
     sides: NDArray[np.uint8]
     """(k,) what told the sides of its normals."""
+    nesting: Nesting | None
+    """Bodies within others, where they are cavities."""
 
     def nearest(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
         """Row (n,) of the coarse point that each point is taken for."""
@@ -42,11 +45,13 @@ def known_of(store: Store) -> Known:
     found = {name: np.concatenate([of[name] for of in tiles]) for name in tiles[0]}
     order, leads = morton_distinct(found["points"])
     found = {name: values[order[leads]] for name, values in found.items()}
-    part = parts(Neighbourhood(found["points"]), found["oriented"])
+    around, oriented = Neighbourhood(found["points"]), found["oriented"]
+    part = parts(around, oriented)
     field = FieldAtPoints(found["strength"], found["normals"], found["difference"])
     opened = open_parts(part, field)
     seen = found["seen"] > 0 if "seen" in found else None
-    return Known(found["points"], opened, told_by(part, opened, found["oriented"], field, seen))
+    nesting = None if store.params.nested == "solid" else cavities(around, oriented, part, seen)
+    return Known(around.points, opened, told_by(part, opened, oriented, field, seen), nesting)
 
 
 def _of_tile(store: Store, tile: int) -> dict[str, NDArray[np.float64]]:

@@ -257,8 +257,13 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         out["strays"][row] = solved["stray"]
         like = known.nearest(store.tile_points(tile))
         out["open"][row], out["sides"][row] = known.open[like], known.sides[like]
+        if known.nesting is not None:
+            turned = row[known.nesting.turned[like]]
+            out["normals"][turned] *= -1
         if store.interior:
             inside = solved["e_max"] < alpha
+            if known.nesting is not None:
+                inside &= ~known.nesting.inner[like]
             out["interior"][row] = inside & oriented["enclosed"] if store.params.alpha == "auto" else inside
     return out
 

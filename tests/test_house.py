@@ -18,6 +18,7 @@ ROOMS = [
     "angles",
     "sculpt",
     "method",
+    "reading",
     "solver",
     "tiles",
     "estimate",

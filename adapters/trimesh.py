@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin import estimate
+from face_plugin.cloud import as_points
 from face_plugin.errors import require
 from face_plugin.params import Params
 from face_plugin.result import Result
@@ -56,7 +57,8 @@ def estimate_normals(geometry: Any, params: Params | None = None, **options: Any
     >>> estimate_normals(trimesh.PointCloud(sphere(300).points)).normals.shape
     (300, 3)
     """
-    return estimate.estimate_normals(points_of(geometry), params, **options)
+    # A path of trimesh's is drawn in the plane: its vertices are no sample of a curve.
+    return estimate.estimate_normals(as_points(points_of(geometry)), params, **options)
 
 
 def reconstruct(geometry: Any, params: Params | None = None, **options: Any) -> Any:

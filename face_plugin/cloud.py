@@ -90,6 +90,11 @@ class Cloud:
         """Number n of input points."""
         return len(self.rows)
 
+    @property
+    def dimension(self) -> int:
+        """3, or 2 in the plane."""
+        return int(self.points.shape[1])
+
     def plane_normal(self) -> NDArray[np.float64]:
         """Return the canonical unit normal (3,) of the plane of best fit, its greatest component positive."""
         normal = np.linalg.svd(self.points - self.points.mean(axis=0), full_matrices=False)[2][2]

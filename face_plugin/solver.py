@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from face_plugin import cloud
 from face_plugin.execution import Execution
 from face_plugin.faraday import field
-from face_plugin.faraday.locate import Locator
-from face_plugin.faraday.locate_plane import PlaneLocator
+from face_plugin.faraday.locate_plane import AnyLocator, locator_of
 from face_plugin.method import solve_field
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params, settled
@@ -105,11 +104,6 @@ class FaCE(Sculptable):
         local = None if sensors is None else sensors.in_frame(self.frame, self.cloud.rows)
         self._reading = Reading(solved.cage, around, solved.sheets, plane, self.params, solved.strength, clock, local)
 
-    @property
-    def _dimensions(self) -> tuple[int]:
-        """Dimension of the cloud, as `face_plugin.cloud.as_points` takes it."""
-        return (self.cloud.points.shape[1],)
-
     def _follow(self) -> None:
         self._reading = dataclasses.replace(self._reading, params=self.params, strength=self._sculptor.strength)
 
@@ -124,7 +118,7 @@ class FaCE(Sculptable):
 
     def oriented(self, normals: ArrayLike, trusted: ArrayLike | None = None) -> NDArray[np.floating]:
         """Turn the signs of normals (n, d) that are given, as `face_plugin.orient_normals` does."""
-        given, lines = given_lines(normals, self.cloud.size, self._dimensions[0])
+        given, lines = given_lines(normals, self.cloud.size, self.cloud.dimension)
         trust, rows, lines = checked_trust(trusted, self.cloud.size), self.cloud.rows, self.frame.rotate(lines)
         reading = self._reading
         # What a sensor saw is certain, whatever the field says.
@@ -152,13 +146,13 @@ class FaCE(Sculptable):
         (k,) float64
             Inside a ball, the mean of its cage vertices; outside the box, 1, the strength of unshielded space.
         """
-        local = self.frame.to_unit(cloud.as_points(query, "query", self._dimensions))
+        local = self.frame.to_unit(cloud.as_points(query, "query", (self.cloud.dimension,)))
         return self.locator.interpolate(local, self.vertex_strength, outside=1.0)
 
     @cached_property
-    def locator(self) -> Locator | PlaneLocator:
+    def locator(self) -> AnyLocator:
         """Interpolation of any values at the vertices of the mesh, for positions in the canonical frame."""
-        return PlaneLocator(self.mesh) if self._reading.around.plane else Locator(self.mesh)
+        return locator_of(self.mesh)
 
     def interior(self, alpha: float | str | None = None) -> NDArray[np.bool_]:
         """Which input points lie inside the object. Nothing is solved again, whatever alpha.
@@ -184,13 +178,11 @@ class FaCE(Sculptable):
 
     def result(self, *, filter_interior: bool = False) -> Result:
         """Everything that is known of the input points."""
-        dtype, rows = self.cloud.dtype, self.cloud.rows
-        oriented = self.normals()
-        params = self.params
+        dtype, rows, params = self.cloud.dtype, self.cloud.rows, self.params
         if filter_interior:
             params = dataclasses.replace(params, alpha=self._reading.threshold(params.alpha))
         return Result(
-            normals=oriented,
+            normals=self.normals(),
             strength=self._reading.seen.strength[rows].astype(dtype),
             confidence=np.where(self.strays, 0.0, self._reading.confidence[rows]).astype(dtype),
             strays=self.strays,

@@ -48,6 +48,11 @@ def test_a_scene_is_all_its_geometries_in_its_own_frame():
         adapter.points_of(trimesh.Scene())
 
 
+def test_points_in_the_plane_are_refused():
+    with pytest.raises(ValueError, match=r"points must have the shape \(n, 3\), found \(50, 2\)"):
+        adapter.estimate_normals(np.random.default_rng(0).random((50, 2)))
+
+
 def test_sensors_are_passed_on():
     room = box(600)
     result = adapter.estimate_normals(trimesh.PointCloud(room.points), viewpoints=[[0.1, 0.0, 0.0]])

@@ -35,6 +35,7 @@ def run(name, folder, *arguments):
         ("open3d_dropin.py", ("--points", "800"), {"open3d_dropin.png"}),
         ("which_side.py", ("--points", "600", "--only", "terrain"), {"which_side_terrain.png"}),
         ("method_steps.py", ("--points", "2500"), {"method_steps.png"}),
+        ("plane.py", ("--points", "60"), {"plane.png"}),
         ("meshlab_script.py", ("--points", "1500"), {"meshlab_script.png", "meshlab_script.ply"}),
     ],
 )

@@ -70,6 +70,13 @@ def test_what_lies_within_is_interior(curve, even):
     assert (facing(shape, result) > 0).mean() >= 0.999
 
 
+def test_a_ring_with_a_hole():
+    shape = nested_circles(400)
+    result = estimate_normals(shape.points, Params(nested="cavity"), filter_interior=True)
+    assert ((facing(shape, result) < 0) == shape.interior).all()
+    assert not result.interior.any()
+
+
 @pytest.mark.parametrize("even", [True, False])
 def test_an_open_spiral_has_one_side(even):
     shape = spiral(1000, even=even)

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from face_plugin.faraday.gradient import ball_means
+from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.meshers import CageMesh
 
-__all__ = ["PlaneLocator"]
+__all__ = ["AnyLocator", "PlaneLocator", "locator_of"]
 
 
 class PlaneLocator:
@@ -66,3 +67,11 @@ class PlaneLocator:
             out[within] = ball_means(self.mesh, columns)[owner[within, 0]]
         out[triangle < 0] = outside
         return np.asarray(out.reshape(len(points), *values.shape[1:]))
+
+
+AnyLocator = Locator | PlaneLocator
+
+
+def locator_of(mesh: CageMesh) -> AnyLocator:
+    """Interpolation in a mesh, of tetrahedra or of triangles."""
+    return PlaneLocator(mesh) if mesh.vertices.shape[1] == 2 else Locator(mesh)

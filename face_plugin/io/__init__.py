@@ -20,6 +20,7 @@ from face_plugin.io.cloudfile import Array, CloudFile, replacing
 __all__ = [
     "CLOUD_SUFFIXES",
     "MESH_SUFFIXES",
+    "PLANE_SUFFIXES",
     "READ_SUFFIXES",
     "CloudFile",
     "check_output",
@@ -46,6 +47,8 @@ CLOUD_SUFFIXES = tuple(_MODULES)
 """Extensions of the clouds that can be written."""
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
 """Extensions of the meshes that can be written."""
+PLANE_SUFFIXES = (".txt", ".csv", ".asc", ".npy", ".npz")
+"""Extensions of the files that hold points in the plane: two columns, or columns x and y and no other coordinate."""
 log = logging.getLogger(__name__)
 
 
@@ -107,7 +110,8 @@ def read_cloud(path: str | os.PathLike[str], *, strict: bool = True) -> CloudFil
     Returns
     -------
     CloudFile
-        Points in the file's own dtype, normals where it has them, and everything else it says.
+        Points (n, 3), or (n, 2) where the file has two coordinates (`PLANE_SUFFIXES`), in the file's own dtype,
+        normals where it has them, and everything else it says.
 
     Raises
     ------
@@ -157,7 +161,7 @@ def write_cloud(
         One of `CLOUD_SUFFIXES`.
     cloud : CloudFile
         What was read, or ``CloudFile(points)``.
-    normals : (n, 3) array, optional
+    normals : (n, d) array, optional
         Take the place of the normals of the cloud, or are added.
     extra : dict of str to (n,) array, optional
         Further values for each point; an attribute of the same name is replaced.
@@ -180,8 +184,10 @@ def write_cloud(
     path = Path(path)
     suffix = _suffix(path, CLOUD_SUFFIXES)
     extra = dict(extra or {})
-    if normals is not None and normals.shape != (len(cloud), 3):
-        raise ValueError(f"normals: shape {normals.shape}, expected ({len(cloud)}, 3)")
+    if normals is not None and normals.shape != cloud.points.shape:
+        raise ValueError(f"normals: shape {normals.shape}, expected {cloud.points.shape}")
+    if cloud.points.shape[1] == 2 and suffix not in PLANE_SUFFIXES:
+        raise ValueError(f"{path}: points in the plane go to {', '.join(PLANE_SUFFIXES)}, found {suffix}")
     for name, values in {**extra, "keep": np.empty(len(cloud)) if keep is None else keep}.items():
         if len(values) != len(cloud):
             raise ValueError(f"{name}: {len(values)} values for {len(cloud)} points")

@@ -11,7 +11,7 @@ from typing import IO, Any, Literal
 import numpy as np
 
 from face_plugin.io.cloudfile import Array, CloudFile, columns, malformed
-from face_plugin.io.names import NORMAL, POINT, guess_names, meanings
+from face_plugin.io.names import NORMAL, POINT, axes_of, guess_names, is_known, meanings
 
 log = logging.getLogger(__name__)
 
@@ -33,11 +33,11 @@ def read(path: Path) -> CloudFile:
         raise malformed(path, kind, error) from error
     if loaded.dtype.names is not None:
         return _from_records(path, loaded)
-    check_table(path, loaded)
+    check_table(path, loaded, least=2)
     names = array_names(loaded)
     has_normals = all(n in names for n in NORMAL)
     return CloudFile(
-        points=loaded[:, :3],
+        points=loaded[:, : min(loaded.shape[1], 3)],
         normals=loaded[:, 3:6] if has_normals else None,
         attributes={name: loaded[:, k] for k, name in enumerate(names) if name not in POINT + NORMAL},
         suffix=".npy",
@@ -121,9 +121,20 @@ def _members(path: Path) -> tuple[dict[str, Array], tuple[str, ...]]:
     return arrays, tuple(problems)
 
 
-def check_table(path: Path, loaded: Array) -> None:
-    """Raise ValueError unless an array has three columns of numbers or more."""
-    if loaded.ndim != 2 or loaded.shape[1] < 3 or loaded.dtype.kind not in "fiu":
+def in_plane(path: Path) -> bool:
+    """Whether an NPY file holds points in the plane."""
+    try:
+        loaded = load_npy(path, mapped=True)
+    except (ValueError, OSError):
+        return False
+    if loaded.dtype.names is not None:
+        return len(record_axes(loaded.dtype)) == 2
+    return loaded.ndim == 2 and loaded.shape[1] == 2
+
+
+def check_table(path: Path, loaded: Array, *, least: int = 3) -> None:
+    """Raise ValueError unless an array has three columns of numbers or more; `least` 2 admits points in the plane."""
+    if loaded.ndim != 2 or loaded.shape[1] < least or loaded.dtype.kind not in "fiu":
         found = f"{loaded.dtype} array of shape {loaded.shape}"
         raise malformed(path, "NPY", f"{found}, expected numbers of shape (n, 3) or more columns")
 
@@ -136,11 +147,19 @@ def array_names(loaded: Array) -> list[str]:
     return names
 
 
-def check_records(path: Path, dtype: np.dtype[Any], shape: tuple[int, ...]) -> dict[str, str]:
+def record_axes(dtype: np.dtype[Any]) -> tuple[str, ...]:
+    """Return the axes of the points of records: x, y, z, or x, y in the plane."""
+    names = dtype.names or ()
+    return axes_of(meanings(names), rest=sum(not is_known(name) for name in names))
+
+
+def check_records(
+    path: Path, dtype: np.dtype[Any], shape: tuple[int, ...], axes: tuple[str, ...] = POINT
+) -> dict[str, str]:
     """Return the fields of records by their meaning; ValueError unless x, y, z are numbers."""
     names = dtype.names or ()
     found = meanings(names)
-    wrong = [axis for axis in POINT if axis not in found or dtype[found[axis]].kind not in "fiu"]
+    wrong = [axis for axis in axes if axis not in found or dtype[found[axis]].kind not in "fiu"]
     if wrong or len(shape) != 1:
         fields = {name: str(dtype[name]) for name in names}
         raise malformed(path, "NPY", f"records of shape {shape} with {fields}, expected numbers x, y, z")
@@ -148,12 +167,14 @@ def check_records(path: Path, dtype: np.dtype[Any], shape: tuple[int, ...]) -> d
 
 
 def _from_records(path: Path, loaded: Array) -> CloudFile:
-    found = check_records(path, loaded.dtype, loaded.shape)
-    has_normals = all(n in found and loaded.dtype[found[n]].kind in "fiu" for n in NORMAL)
-    used = {found[n] for n in (*POINT, *(NORMAL if has_normals else ()))}
+    axes = record_axes(loaded.dtype)
+    found = check_records(path, loaded.dtype, loaded.shape, axes)
+    of_normal = NORMAL[: len(axes)]
+    has_normals = all(n in found and loaded.dtype[found[n]].kind in "fiu" for n in of_normal)
+    used = {found[n] for n in (*axes, *(of_normal if has_normals else ()))}
     return CloudFile(
-        points=np.stack([loaded[found[n]] for n in POINT], axis=1),
-        normals=np.stack([loaded[found[n]] for n in NORMAL], axis=1) if has_normals else None,
+        points=np.stack([loaded[found[n]] for n in axes], axis=1),
+        normals=np.stack([loaded[found[n]] for n in of_normal], axis=1) if has_normals else None,
         attributes={name: loaded[name] for name in loaded.dtype.names or () if name not in used},
         suffix=".npy",
         source="records",
@@ -162,7 +183,8 @@ def _from_records(path: Path, loaded: Array) -> CloudFile:
 
 def _from_npz(path: Path, arrays: dict[str, Array], problems: tuple[str, ...]) -> CloudFile:
     found = [key for key in _POINT_KEYS if key in arrays]
-    found = found or [key for key, values in arrays.items() if values.ndim == 2 and values.shape[1:] == (3,)]
+    for dimension in (3, 2):
+        found = found or [key for key, values in arrays.items() if values.ndim == 2 and values.shape[1] == dimension]
     shapes = {key: values.shape for key, values in arrays.items()}
     if not found:
         raise malformed(path, "NPZ", f"no array 'points' of shape (n, 3), but {shapes}")
@@ -170,7 +192,7 @@ def _from_npz(path: Path, arrays: dict[str, Array], problems: tuple[str, ...]) -
     if points.dtype.names is not None:
         cloud = _from_records(path, points)
         return CloudFile(cloud.points, cloud.normals, cloud.attributes, ".npz", problems=problems)
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or points.dtype.kind not in "fiu":
         raise malformed(path, "NPZ", f"{found[0]!r} is {points.dtype} of shape {points.shape}, expected (n, 3)")
     normals = arrays.get("normals")
     if normals is not None and (normals.shape != points.shape or normals.dtype.kind not in "fiu"):
@@ -202,10 +224,11 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
         np.savez(path, allow_pickle=False, **{**arrays, **kept})
         return
     points, normals, attributes = columns(cloud, normals, extra, keep)
-    if cloud.source == "records":
-        named = {axis: points[:, k] for k, axis in enumerate(POINT)}
+    # Four columns would be points in space, and something more: what has names cannot be mistaken.
+    if cloud.source == "records" or (points.shape[1] == 2 and normals is not None):
+        named = {axis: points[:, k] for k, axis in enumerate(POINT[: points.shape[1]])}
         if normals is not None:
-            named.update({name: normals[:, k] for k, name in enumerate(NORMAL)})
+            named.update({name: normals[:, k] for k, name in enumerate(NORMAL[: points.shape[1]])})
         named.update(attributes)
         records = np.empty(len(points), dtype=[(name, values.dtype) for name, values in named.items()])
         for name, values in named.items():

@@ -25,9 +25,9 @@ class CloudFile:
 
     Attributes
     ----------
-    points : (n, 3) array
+    points : (n, 3) array, or (n, 2) in the plane
         Coordinates in the file's own unit and dtype.
-    normals : (n, 3) array or None
+    normals : (n, d) array or None
         Normals which the file holds, not checked.
     attributes : dict of str to (n,) or (n, k) array
         Every other value a point has (colour, intensity, label, ...), as it stands in the file.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from face_plugin.io.cloudfile import malformed
-from face_plugin.io.names import POINT, is_known, is_time, meanings
+from face_plugin.io.names import axes_of, is_known, is_time, meanings
 
 __all__ = ["COMMENT", "Layout", "Sheet", "decoded", "is_number", "open_sheet", "split"]
 
@@ -17,6 +17,8 @@ log = logging.getLogger(__name__)
 
 COMMENT = ("#", "//", ";;", "%", "!", "/*")
 _DELIMITERS = (";", "\t", "|", ",")
+# Text whose extension does not promise three coordinates.
+PLANE_TEXT = (".txt", ".csv", ".asc")
 # Lines to look for the first coordinates in: no preamble of a text file is as long.
 _PREAMBLE = 10_000
 # Rows in which a decimal comma is looked for: whole numbers have none.
@@ -159,7 +161,7 @@ def _words(line: str, layout: Layout) -> list[str]:
 
 
 def _first_row(path: Path, lines: list[str]) -> tuple[int, Layout]:
-    """Find the first line with three numbers or more, and how it is delimited."""
+    """Find the first line with three numbers or more, and how it is delimited; two are points in the plane."""
     short = None
     for k, line in enumerate(lines[:_PREAMBLE]):
         text = line.strip()
@@ -170,9 +172,11 @@ def _first_row(path: Path, lines: list[str]) -> tuple[int, Layout]:
         if sum(map(is_number, words)) >= 3:
             return k, layout
         if short is None and words and all(map(is_number, words)):
-            short = (k, words)
+            short = (k, words, layout)
     if short is not None:
-        k, words = short
+        k, words, layout = short
+        if len(words) == 2 and path.suffix.lower() in PLANE_TEXT:
+            return k, layout
         found = f"line {k + 1} has {len(words)} columns ({lines[k][:60]!r}), expected 3 or more"
         raise malformed(path, "text", found)
     raise malformed(path, "text", "no line with coordinates")
@@ -208,7 +212,7 @@ def _header(
         text = lines[k][sign.end() :] if sign else lines[k]
         names = _names(text, layout, widths)
         found = meanings(names)
-        complete = all(axis in found for axis in POINT)
+        complete = all(axis in found for axis in axes_of(found))
         known = sum(map(is_known, names))
         titled = not sign and k == filled[-1]
         if len(names) in widths and names and (complete or titled or known >= 2 or is_time(names[0])):

@@ -14,6 +14,7 @@ __all__ = [
     "NORMAL",
     "POINT",
     "are_bytes",
+    "axes_of",
     "colour_bytes",
     "guess_names",
     "is_known",
@@ -100,6 +101,28 @@ def meanings(names: Iterable[str]) -> dict[str, str]:
     return found
 
 
+def axes_of(found: Mapping[str, str], *, rest: int = 0) -> tuple[str, ...]:
+    """Return the axes of the points: x, y, z; x, y where there is no z, and no column that could be one.
+
+    Normals nx, ny without nz are certain.
+
+    Parameters
+    ----------
+    found : dict of str to str
+        As `meanings` has it.
+    rest : int
+        Number of columns of numbers whose names mean nothing: one of them may be a height.
+
+    Examples
+    --------
+    >>> axes_of(meanings(["x", "y", "nx", "ny"])), axes_of(meanings(["x", "y", "depth"]), rest=1)
+    (('x', 'y'), ('x', 'y', 'z'))
+    """
+    flat = "nx" in found and "ny" in found and "nz" not in found
+    plane = "x" in found and "y" in found and "z" not in found and (flat or not rest)
+    return POINT[:2] if plane else POINT
+
+
 def is_known(name: str) -> bool:
     """Whether a word is the usual name of a column."""
     return _spelled(name) in _SPELLINGS or _spelled(name) in _OTHERS or is_time(name)
@@ -113,12 +136,14 @@ def is_time(name: str) -> bool:
 def guess_names(table: list[Array], *, suffix: str = "") -> list[str]:
     """Name columns that have no names: x, y, z, then normals (unit length) and colours (bytes), then numbers.
 
-    Text before the first number is a label of the point. ``.pts`` files have an intensity before the colours,
-    ``.xyzrgb`` files colours of 0 to 1.
+    Two columns are points in the plane. Text before the first number is a label of the point. ``.pts`` files have an
+    intensity before the colours, ``.xyzrgb`` files colours of 0 to 1.
     """
     labels = next((k for k, column in enumerate(table) if column.dtype.kind != "U"), 0)
     if labels:
         return [f"label_{k + 1}" for k in range(labels)] + guess_names(table[labels:], suffix=suffix)
+    if len(table) == 2:
+        return [*POINT[:2]]
     names = [*POINT]
     if _are_normals(table[3:6]):
         names += NORMAL

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from face_plugin.io.cloudfile import Array, CloudFile, columns, format_column, interleave, malformed
 from face_plugin.io.dialect import Layout, Sheet, is_number, open_sheet, split
-from face_plugin.io.names import COLOUR, NORMAL, POINT, guess_names, meanings, with_colours
+from face_plugin.io.names import COLOUR, NORMAL, POINT, axes_of, guess_names, is_known, meanings, with_colours
 
 
 def read(path: Path) -> CloudFile:
@@ -21,14 +22,17 @@ def read(path: Path) -> CloudFile:
     names = list(layout.names) or guess_names(table, suffix=suffix)
     found = meanings(names)
     at = {meaning: names.index(name) for meaning, name in found.items()}
-    if any(axis not in at or table[at[axis]].dtype.kind not in "fiu" for axis in POINT):
+    unknown = [k for k, name in enumerate(names) if table[k].dtype.kind in "fiu" and not is_known(name)]
+    axes = axes_of(found, rest=len(unknown))
+    if any(axis not in at or table[at[axis]].dtype.kind not in "fiu" for axis in axes):
         raise malformed(path, "text", f"columns {names}: no numbers under x, y, z")
-    has_normals = all(n in at and table[at[n]].dtype.kind in "fiu" for n in NORMAL)
-    used = {at[n] for n in (*POINT, *(NORMAL if has_normals else ()))}
+    of_normal = NORMAL[: len(axes)]
+    has_normals = all(n in at and table[at[n]].dtype.kind in "fiu" for n in of_normal)
+    used = {at[n] for n in (*axes, *(of_normal if has_normals else ()))}
     layout = Layout(**{**vars(layout), "names": tuple(names)})
     return CloudFile(
-        points=np.stack([table[at[n]].astype(np.float64) for n in POINT], axis=1),
-        normals=np.stack([table[at[n]] for n in NORMAL], axis=1) if has_normals else None,
+        points=np.stack([table[at[n]].astype(np.float64) for n in axes], axis=1),
+        normals=np.stack([table[at[n]] for n in of_normal], axis=1) if has_normals else None,
         attributes={name: table[k] for k, name in enumerate(names) if k not in used},
         suffix=suffix,
         source=layout,
@@ -102,17 +106,21 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
     # Places of columns mean something in these; other text may look as the file that was read.
     fixed = {".pts", ".xyzrgb"} & {path.suffix.lower(), cloud.suffix}
     if not isinstance(layout, Layout) or (fixed and path.suffix.lower() != cloud.suffix):
-        layout, attributes = _fresh(path.suffix.lower(), attributes)
+        layout, attributes = _fresh(path.suffix.lower(), attributes, POINT[: points.shape[1]])
+    of_normal = NORMAL[: points.shape[1]]
+    if points.shape[1] == 2 and normals is not None and layout.header is None:
+        # Without names four columns are points in space, and something more.
+        layout = replace(layout, header="# ")
     found = meanings(layout.names)
     meaning = {name: key for key, name in found.items()}
-    has_normals = all(n in found for n in NORMAL)
+    has_normals = all(n in found for n in of_normal)
     values: dict[str, Array] = {}
     for name in layout.names:
         if meaning.get(name) in POINT:
             values[name] = points[:, POINT.index(meaning[name])]
-            if meaning[name] == "z" and normals is not None and not has_normals:
-                values.update({n: normals[:, k] for k, n in enumerate(NORMAL)})
-        elif meaning.get(name) in NORMAL and has_normals and normals is not None:
+            if meaning[name] == POINT[points.shape[1] - 1] and normals is not None and not has_normals:
+                values.update({n: normals[:, k] for k, n in enumerate(of_normal)})
+        elif meaning.get(name) in of_normal and has_normals and normals is not None:
             values[name] = normals[:, NORMAL.index(meaning[name])]
         else:
             values[name] = attributes[name]
@@ -130,10 +138,10 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
         stream.write(interleave([_cells(column, layout) for column in values.values()], separator))
 
 
-def _fresh(suffix: str, attributes: dict[str, Array]) -> tuple[Layout, dict[str, Array]]:
+def _fresh(suffix: str, attributes: dict[str, Array], axes: tuple[str, ...]) -> tuple[Layout, dict[str, Array]]:
     """Layout of a file that is made anew: CSV has names, PTS a count and intensity before the colours."""
     comma = suffix == ".csv"
-    names = [*POINT, *attributes]
+    names = [*axes, *attributes]
     if suffix in (".pts", ".xyzrgb"):
         attributes = with_colours(attributes)
         first = ["intensity"] if suffix == ".pts" else []
@@ -141,7 +149,7 @@ def _fresh(suffix: str, attributes: dict[str, Array]) -> tuple[Layout, dict[str,
             first += COLOUR
             if suffix == ".xyzrgb":
                 attributes.update({c: np.round(attributes[c] / 255.0, 5) for c in COLOUR})
-        names = [*POINT, *(n for n in first if n in attributes), *(n for n in attributes if n not in first)]
+        names = [*axes, *(n for n in first if n in attributes), *(n for n in attributes if n not in first)]
     layout = Layout("," if comma else None, (), tuple(names), "" if comma else None, suffix == ".pts")
     return layout, attributes
 

@@ -33,7 +33,8 @@ DUPLICATE = 0.25
 BAND = 4.0
 # But no more than this fraction of the cloud's diagonal: a handful of points shows no band.
 BROADEST = 0.05
-# Points scatter where the deviation is more than this many spacings.
+# Points scatter where the deviation is more than this many spacings, there and at most points: noise is the sensor's,
+# and all over the cloud.
 SCATTER = 0.1
 # Neighbours that an edge leads to, ahead and back each; and the least cosine between the edge and the curve.
 AHEAD = 2
@@ -116,7 +117,8 @@ def _flattest(
         ratio = low / (mean + half)
         better = ratio < best
         best = np.where(better, ratio, best)
-        scatter = np.where(better, np.sqrt(low), scatter)
+        # At the smallest size bending and noise look alike.
+        scatter = np.where(better, np.sqrt(low) if size > SIZES[0] else 0.0, scatter)
         normals = np.where(better[:, None], np.stack([np.cos(angle), np.sin(angle)], axis=1), normals)
     return normals, scatter
 
@@ -152,7 +154,8 @@ def curve_separation(around: Neighbourhood, cage_spacing: float | None, *, coars
     if not coarsen:
         return separation
     scatter = lines_of_curves(around).scatter
-    band = np.where(scatter > SCATTER * around.spacing, np.minimum(BAND * scatter, BROADEST), 0.0)
+    scatters = scatter > SCATTER * around.spacing
+    band = np.where(scatters & (scatters.mean() > 0.5), np.minimum(BAND * scatter, BROADEST), 0.0)
     return np.maximum(separation, band)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.execution import Execution, allowed_memory
+from face_plugin.io.arrays import in_plane
 from face_plugin.io.cloudfile import replacing
 from face_plugin.io.disk import claimed
 from face_plugin.io.sinks import WRITERS, Columns
@@ -73,6 +74,8 @@ def streams(source: Path, output: Path, execution: Execution) -> bool:
     False
     """
     if source.suffix.lower() not in STREAMED or output.suffix.lower() not in STREAMED:
+        return False
+    if source.suffix.lower() == ".npy" and in_plane(source):
         return False
     return open_source(source).count * HELD_BYTES + PROCESS_BYTES > allowed_memory(execution.memory, SHARE)
 

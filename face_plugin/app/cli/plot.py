@@ -77,7 +77,8 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     with console.stage("read"):
         cloud = read_cloud(args.input)
     points, seen = cloud.points, sensors_in(args, console, cloud)
-    if args.interior and args.sculpt is None:
+    plane = points.shape[1] == 2
+    if args.interior and args.sculpt is None and not plane:
         result = estimate_normals(
             points, params, filter_interior=True, **seen, execution=execution, progress=console.progress
         )
@@ -101,7 +102,19 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "axis": args.axis,
     }
     summary = {"input": args.input, "output": output, "points": len(points)}
-    if args.interior and result.interior is not None:
+    if plane:
+        with console.stage("draw"):
+            figure = plot.plot_curves(
+                points,
+                result.normals,
+                plot.field_within(face),
+                interior=result.interior,
+                alpha=_threshold(result.params),
+                title=looks["title"],
+            )
+        if result.interior is not None:
+            summary["dropped"] = int(result.interior.sum())
+    elif args.interior and result.interior is not None:
         meshes = []
         for keep in (slice(None), result.kept):
             with console.stage("surface"):

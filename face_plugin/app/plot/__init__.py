@@ -1,5 +1,6 @@
 """Pictures of a cloud, its normals and its surface, drawn without a display (extra ``plot``)."""
 
+from face_plugin.app.plot.curves import plot_curves
 from face_plugin.app.plot.figures import PLOT_SUFFIXES, save_figure
 from face_plugin.app.plot.interior import plot_interior
 from face_plugin.app.plot.render import Camera, render_mesh, render_points
@@ -9,6 +10,7 @@ __all__ = [
     "PLOT_SUFFIXES",
     "Camera",
     "field_within",
+    "plot_curves",
     "plot_interior",
     "plot_result",
     "render_mesh",

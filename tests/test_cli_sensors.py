@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from face_plugin import shapes
+from face_plugin import estimate_normals, shapes
 from face_plugin.app.cli import main
 from face_plugin.filters import Chain, Interior, Normals
 from face_plugin.io import CloudFile, read_cloud, write_cloud
@@ -166,3 +166,51 @@ def test_info_counts_strays(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     source = saved(tmp_path, np.concatenate([ROOM.points, [[9.0, 0.0, 0.0]]]))
     assert json.loads(run(capfd, "info", source, "--json")[1])["strays"] == 1
     assert run(capfd, "info", saved(tmp_path, np.zeros((2, 3)), "two.npy"))[0] == 0
+
+
+def two_rooms() -> tuple[np.ndarray, np.ndarray]:
+    """A ball that a sensor saw from inside, and one that another saw from outside, through the wall of the first."""
+    ball = shapes.sphere(900)
+    return np.concatenate([ball.points, ball.points + np.array([3.0, 0, 0])]), np.concatenate(
+        [ball.points, ball.points]
+    )
+
+
+@pytest.mark.parametrize("suffix", ["ply", "npz", "csv"])
+def test_a_column_says_which_viewpoint_saw_each_point(tmp_path, capfd, suffix) -> None:
+    points, outward = two_rooms()
+    rows = np.repeat([1, 0], 900).astype(np.int32)
+    cloud, out = tmp_path / f"in.{suffix}", tmp_path / "out.ply"
+    write_cloud(cloud, CloudFile(points, attributes={"scan": rows}))
+    views = ["--viewpoint", "9,0,0", "--viewpoint", "0,0,0", "--seen-from", "scan"]
+    assert run(capfd, "normals", cloud, "-o", out, "--quiet", *views) == (0, "", "")
+    expected = estimate_normals(read_cloud(cloud).points, viewpoints=[[9, 0, 0], [0, 0, 0]], seen_from=rows)
+    np.testing.assert_allclose(read_cloud(out).normals, expected.normals, atol=1e-6)
+    assert ((read_cloud(out).normals * outward).sum(axis=1)[:900] < 0).all()
+
+
+@pytest.mark.parametrize(
+    ("column", "views", "message"),
+    [
+        ("when", ["--viewpoint", "0,0,0"], "--seen-from must name a column of the input, found 'when'; there are scan"),
+        ("share", ["--viewpoint", "0,0,0"], "--seen-from must name a column of whole numbers, found 'share'"),
+        ("scan", ["--viewpoint", "0,0,0"], "seen_from must hold rows of viewpoints, 0 to 0, or -1; found 0 to 1"),
+        ("scan", [], "viewpoints or up must be given with seen_from"),
+    ],
+)
+def test_a_column_that_does_not_fit_is_named(tmp_path, capfd, column, views, message) -> None:
+    points, _ = two_rooms()
+    cloud = tmp_path / "in.npz"
+    rows = np.repeat([1, 0], 900)
+    write_cloud(cloud, CloudFile(points, attributes={"scan": rows, "share": rows + 0.5}))
+    code, _, err = run(capfd, "normals", cloud, "-o", tmp_path / "out.ply", "--seen-from", column, *views)
+    assert code != 0
+    assert message in err
+
+
+def test_a_column_needs_the_cloud_in_one_piece(tmp_path, capfd) -> None:
+    points, _ = two_rooms()
+    words = ["normals", saved(tmp_path, points), "-o", tmp_path / "out.npy", "--resume", "--viewpoint", "0,0,0"]
+    code, _, err = run(capfd, *words, "--seen-from", "scan")
+    assert code != 0
+    assert "--seen-from needs a cloud with columns, in one piece" in err

@@ -39,6 +39,11 @@ def add_sensors(parser: argparse.ArgumentParser, *, up: str = "--up") -> None:
         help="file of such positions, such as a trajectory (CSV, PLY, ...); none: not even those that IN holds",
     )
     group.add_argument(
+        "--seen-from",
+        metavar="COLUMN",
+        help="column of IN with the number of the viewpoint that saw each point, from 0; -1 where that is not known",
+    )
+    group.add_argument(
         up,
         dest="seen_up",
         metavar="AXIS|X,Y,Z",
@@ -65,7 +70,7 @@ def joined(words: Sequence[str]) -> list[str]:
 
 
 def sensors_in(args: argparse.Namespace, console: Console, cloud: CloudFile | None = None) -> dict[str, Any]:
-    """Return ``viewpoints`` and ``up`` as the library takes them: as given, or else those that the file holds.
+    """Return sensors as the library takes them by keyword: as given, or else those that the file holds.
 
     Raises
     ------
@@ -80,9 +85,24 @@ def sensors_in(args: argparse.Namespace, console: Console, cloud: CloudFile | No
     views = np.concatenate(given) if given else None
     if views is None and args.viewpoints is None and args.seen_up is None and cloud is not None:
         views = own_viewpoints(cloud, console)
+    seen = None if args.seen_from is None else _column(args.seen_from, cloud)
     # Said now rather than after the cloud is prepared.
-    sensors_of(views, None, args.seen_up)
-    return {"viewpoints": views, "up": args.seen_up}
+    sensors_of(views, seen, args.seen_up)
+    return {"viewpoints": views, "seen_from": seen, "up": args.seen_up}
+
+
+def _column(name: str, cloud: CloudFile | None) -> NDArray[np.intp]:
+    """Read rows (n,) of viewpoints from a column of the cloud; formats of text have all numbers as real ones."""
+    if cloud is None:
+        raise ValueError("--seen-from needs a cloud with columns, in one piece: more --max-memory, and no --resume")
+    if name not in cloud.attributes:
+        found = ", ".join(cloud.attributes) or "none"
+        raise ValueError(f"--seen-from must name a column of the input, found {name!r}; there are {found}")
+    values = cloud.attributes[name]
+    rows = values.astype(np.intp) if values.ndim == 1 and values.dtype.kind in "iuf" else None
+    if rows is None or not np.array_equal(rows, values):
+        raise ValueError(f"--seen-from must name a column of whole numbers, found {name!r} of {values.dtype}")
+    return rows
 
 
 def own_viewpoints(cloud: CloudFile, console: Console) -> NDArray[np.float64] | None:

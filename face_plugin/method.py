@@ -28,9 +28,9 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
 from face_plugin.sides.enclosure import DARK
+from face_plugin.sides.facing import resettled, sides_by_sensors
 from face_plugin.sides.parts import open_parts, parts
 from face_plugin.sides.patches import Planes, planes_of, turned_patches
-from face_plugin.sides.sensors import resettled, sides_by_sensors
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.steps import turn_sides
 from face_plugin.sides.vantage import is_open, sides_from_vantage
@@ -154,7 +154,7 @@ def refine(
     moving : (n,) bool, optional
         Which normals to refine; the others take part as they are. By default all.
     sights : (n, 3) float64, optional
-        Directions in which sensors saw the points, as `face_plugin.sides.sensors.sights` has them: they decide on the
+        Directions in which sensors saw the points, as `face_plugin.sides.sights.sights` has them: they decide on the
         sides then, and the field does not.
 
     Returns

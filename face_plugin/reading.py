@@ -18,8 +18,10 @@ from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import open_parts, parts, told_by
-from face_plugin.sides.sensors import Sensors, sights
+from face_plugin.sides.patches import planes_of
+from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
+from face_plugin.sides.sights import sights
 from face_plugin.stages import Stage
 
 __all__ = ["Reading"]
@@ -42,7 +44,7 @@ class Reading:
     @cached_property
     def sights(self) -> NDArray[np.float64] | None:
         """Directions (m, 3) in which sensors saw the distinct points."""
-        return None if self.sensors is None else sights(self.around, self.sensors)
+        return None if self.sensors is None else sights(self.around, self.sensors, planes_of(self.around).lines)
 
     @cached_property
     def seen(self) -> FieldAtPoints:

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from face_plugin.compiled import compiled
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.threads import in_threads
 
-__all__ = ["Edges", "couplings", "neighbours_around"]
+__all__ = ["Edges", "connected_parts", "couplings", "neighbours_around"]
 
 # The nearest neighbour in each of so many sectors of the tangent plane: scan lines seven times as far apart as the
 # points along them are joined to one another, which the nearest neighbours alone never are.
@@ -128,3 +130,37 @@ def _nearest_in_sectors(first, last, points, lines, neighbour, found):  # type: 
                 missing -= 1
                 if missing == 0:
                     break
+
+
+def connected_parts(chosen: NDArray[np.bool_], edges: Edges, smallest: int = 1) -> tuple[NDArray[np.intp], int]:
+    """Find the connected parts of the chosen points.
+
+    Parameters
+    ----------
+    chosen : (n,) bool
+    edges : Edges
+    smallest : int
+        Parts of fewer points are left out.
+
+    Returns
+    -------
+    part : (n,) intp
+        Of each point; -1 where there is none.
+    count : int
+        Number of parts.
+
+    Examples
+    --------
+    >>> edges = Edges(np.array([0, 1, 2]), np.array([1, 2, 3]))
+    >>> part, count = connected_parts(np.array([True, True, False, True]), edges)
+    >>> part.tolist(), count
+    ([0, 0, -1, 1], 2)
+    """
+    size = len(chosen)
+    both = chosen[edges.first] & chosen[edges.second]
+    link = coo_matrix((np.ones(int(both.sum())), (edges.first[both], edges.second[both])), shape=(size, size))
+    label = connected_components(link, directed=False)[1]
+    members = np.bincount(label[chosen], minlength=int(label.max()) + 1)
+    large = members >= max(smallest, 1)
+    name = np.where(large, np.cumsum(large) - 1, -1)
+    return np.where(chosen, name[label], -1), int(large.sum())

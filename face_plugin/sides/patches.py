@@ -21,13 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from face_plugin.geometry import plane_fits
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
-from face_plugin.sides.graph import Edges, couplings, neighbours_around
+from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 
 __all__ = ["Planes", "closure", "planes_of", "turned_patches"]
 
@@ -143,7 +141,7 @@ def turned_patches(
         coupling = couplings(around.points, normals, edges)
         sign = cluster_signs(len(around), edges, coupling, HOLD_CLOSED * closed + HOLD_FIELD * field)
     turned = np.zeros(len(around), dtype=np.bool_)
-    patch, count = _patches(sign, edges)
+    patch, count = connected_parts(sign < 0, edges, SMALLEST)
     if count == 0:
         return turned
     inside = patch >= 0
@@ -160,19 +158,6 @@ def turned_patches(
     right = (border > 0) & (BORDER * border**2 + CLOSURE * gain > loss + MARGIN)
     turned[inside] = right[patch[inside]]
     return turned
-
-
-def _patches(sign: NDArray[np.float64], edges: Edges) -> tuple[NDArray[np.intp], int]:
-    """Find connected points of sign -1: the patch (n,) of each, -1 elsewhere and in patches too small; their number."""
-    count = len(sign)
-    turned = sign < 0
-    both = turned[edges.first] & turned[edges.second]
-    link = coo_matrix((np.ones(int(both.sum())), (edges.first[both], edges.second[both])), shape=(count, count))
-    label = connected_components(link, directed=False)[1]
-    size = np.bincount(label[turned], minlength=int(label.max()) + 1)
-    large = size >= SMALLEST
-    name = np.where(large, np.cumsum(large) - 1, -1)
-    return np.where(turned, name[label], -1), int(large.sum())
 
 
 def _border(

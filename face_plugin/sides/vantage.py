@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
+from face_plugin.sides.facing import SIGHT, facing
 from face_plugin.sides.patches import Planes, planes_of
-from face_plugin.sides.sensors import SIGHT, Sensors, facing, sights
+from face_plugin.sides.sensors import Sensors
+from face_plugin.sides.sights import sights
 
 __all__ = ["is_open", "sides_from_vantage"]
 
@@ -28,11 +30,15 @@ SHIELDED = 0.92
 FEWEST = 100
 # A place counts where it sees most of the points, face on: share of points, times the cosine, times how many agree.
 WORTH = 0.5
+# A place nearby must be clearly better than a direction from afar: a little better is chance.
+NEAR = 0.95
 # Points that places are looked for with, and how many of the best are then tried with all points.
 LOOKED_WITH = 700
 TRIED = 2
 # First steps of a place towards a better one, and the last, as fractions of the cloud's extent.
 STEPS = (0.4, 0.2, 0.1, 0.05)
+# A place moves by no more than so many steps of each length: far off, each step farther sees a little more.
+MOVES = 4
 
 
 def is_open(difference: NDArray[np.float64]) -> bool:
@@ -51,7 +57,7 @@ def sides_from_vantage(
 ) -> NDArray[np.float64]:
     """Turn normals (n, 3) to be on one side as seen from the best place; as they are where no place is good.
 
-    Which of the two sides that is, most of the normals decide. `planes` are those of `around`, where they are known.
+    That is the side that faces the place. `planes` are those of `around`, where they are known.
 
     Examples
     --------
@@ -64,20 +70,21 @@ def sides_from_vantage(
     1.0
     """
     lines, edges, coupling = planes or planes_of(around)
-    best, score = None, WORTH
+    best, score = None, WORTH * NEAR
     for place in _places(around.points, lines):
-        evidence = facing(lines, sights(around, place))
+        evidence = facing(lines, sights(around, place, lines))
+        weight = NEAR if place.up is None else 1.0
         # No more than what is seen at all: most places need no more looking at.
-        if np.abs(evidence).mean() <= score:
+        if weight * np.abs(evidence).mean() <= score:
             continue
         sign = cluster_signs(len(around), edges, coupling, SIGHT * evidence)
-        reached = float((evidence * sign).mean())
+        reached = weight * float((evidence * sign).mean())
         if reached > score:
             best, score = sign, reached
     if best is None:
         return normals
     side = np.where(np.einsum("nd,nd->n", lines * best[:, None], normals) < 0, -1.0, 1.0)
-    return np.asarray(normals * (side if side.sum() >= 0 else -side)[:, None])
+    return np.asarray(normals * side[:, None])
 
 
 def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sensors]:
@@ -90,7 +97,7 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sen
     around, few = Neighbourhood(points[some]), lines[some]
 
     def share(place: Sensors) -> float:
-        return float(np.abs(facing(few, sights(around, place))).mean())
+        return float(np.abs(facing(few, sights(around, place, few))).mean())
 
     steps = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
     directions = steps[steps.any(axis=1)]
@@ -100,19 +107,19 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sen
     starts = [middle + 0.5 * half * step for step in steps] + [middle + half.max() * step for step in directions]
     starts = sorted(starts, key=lambda start: -share(Sensors(start)))[: TRIED - 1]
     near = [_climbed(start, share, 2 * float(half.max())) for start in starts]
-    return sorted([Sensors(up=far), Sensors(up=-far), *map(Sensors, near)], key=lambda place: -share(place))[:TRIED]
+    places = [(share(Sensors(up=far)), Sensors(up=far)), (share(Sensors(up=-far)), Sensors(up=-far))]
+    places += [(NEAR * share(Sensors(place)), Sensors(place)) for place in near]
+    return [place for _, place in sorted(places, key=lambda found: -found[0])[:TRIED]]
 
 
 def _climbed(place: NDArray[np.float64], share: Callable[[Sensors], float], extent: float) -> NDArray[np.float64]:
     """Move a place (3,) along the axes for as long as it sees more."""
     best = share(Sensors(place))
     for step in STEPS:
-        moved = True
-        while moved:
-            moved = False
-            for axis in np.eye(3):
-                for sign in (1.0, -1.0):
-                    tried = place + sign * step * extent * axis
-                    if (seen := share(Sensors(tried))) > best:
-                        place, best, moved = tried, seen, True
+        for _ in range(MOVES):
+            tried = [place + sign * step * extent * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+            seen = [share(Sensors(one)) for one in tried]
+            if max(seen) <= best:
+                break
+            place, best = tried[int(np.argmax(seen))], max(seen)
     return place

@@ -1,0 +1,92 @@
+"""The sides that follow from what sensors saw.
+
+A point that a sensor saw faces it: the space between was free. Each point leans to the sensors that see it, by the
+cosine of the angle to its line; points that none sees, and grazing ones, take the side of the sheet that they are part
+of.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.clusters import better_signs, cluster_signs
+from face_plugin.sides.graph import couplings, neighbours_around
+from face_plugin.sides.patches import Planes, planes_of
+
+__all__ = ["SIGHT", "facing", "resettled", "sides_by_sensors"]
+
+# Weight of a line of sight next to the couplings of a point to its neighbours, which are 1 at most each: a few false
+# sights, through gaps, must not tear a sheet.
+SIGHT = 0.5
+# Weight of the side that a line was given before its angle was known better.
+KEPT = 0.25
+
+
+def facing(lines: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Evidence (n,) of the sides of lines (n, 3): positive where they point to the sensors, in [-1, 1]."""
+    return np.asarray(np.clip(np.einsum("nd,nd->n", lines, seen), -1.0, 1.0))
+
+
+def sides_by_sensors(
+    around: Neighbourhood,
+    seen: NDArray[np.float64],
+    blind: NDArray[np.float64] | None = None,
+    planes: Planes | None = None,
+) -> NDArray[np.float64]:
+    """Find unit normals (n, 3) that face what saw them, along whole sheets; lines are those of planes.
+
+    Parameters
+    ----------
+    around : Neighbourhood
+        Of the points.
+    seen : (n, 3) float64
+        As `face_plugin.sides.sights.sights` has it.
+    blind : (n, 3) float64, optional
+        Normals found without sensors: where no sensor saw, they count, as far as they agree with what was seen.
+    planes : Planes, optional
+        Those of `around`, where they are known.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> from face_plugin.sides.sensors import Sensors
+    >>> from face_plugin.sides.sights import sights
+    >>> ball = sphere(1000)
+    >>> around = Neighbourhood(ball.points)
+    >>> inward = sides_by_sensors(around, sights(around, Sensors([0.0, 0.0, 0.0]), ball.normals))
+    >>> bool(((inward * ball.normals).sum(axis=1) < 0).all())
+    True
+    """
+    lines, edges, coupling = planes or planes_of(around)
+    sign = cluster_signs(len(around), edges, coupling, _evidence(lines, seen, blind))
+    return np.asarray(lines * sign[:, None])
+
+
+def _evidence(
+    lines: NDArray[np.float64], seen: NDArray[np.float64], blind: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Weigh what tells the sides (n,) of lines: sights, and normals found blind if the sights bear these out.
+
+    A body seen from outside is what its field says it is, also where no sensor looks; a room is its opposite.
+    """
+    evidence = facing(lines, seen)
+    if blind is not None:
+        agreed = facing(blind, seen)
+        borne_out = max(float(agreed.sum() / max(np.abs(agreed).sum(), np.finfo(float).tiny)), 0.0)
+        evidence = evidence + borne_out**2 * np.einsum("nd,nd->n", lines, blind)
+    return np.asarray(SIGHT * evidence)
+
+
+def resettled(
+    around: Neighbourhood,
+    normals: NDArray[np.float64],
+    seen: NDArray[np.float64],
+    blind: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Settle the sides of normals (n, 3) of better angles again, by what was seen (n, 3) and along sheets."""
+    edges = neighbours_around(around, normals)
+    coupling = couplings(around.points, normals, edges)
+    sign = better_signs(len(around), edges, coupling, _evidence(normals, seen, blind) + KEPT)
+    return np.asarray(normals * sign[:, None])

@@ -1,0 +1,125 @@
+"""What sensors saw: the points that their lines of sight reach.
+
+Which points a sensor saw is not always known, but the points themselves tell: a line of sight is free unless it passes
+another point, nearer to the sensor, within about the distance to that one's neighbours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.sensors import Sensors
+from face_plugin.threads import KDTree
+
+__all__ = ["sights", "visible"]
+
+# A point blocks what is behind it within this share of its spacing: the points of an even sheet cover it.
+COVER = 0.7
+# What is less than this many spacings behind is the same surface, seen at a slant; with more, thin walls are seen
+# through.
+BEHIND = 1.0
+# A point that lies this near to another's tangent plane, in spacings, is of its own sheet and does not hide it: sheets
+# seen at a grazing angle would hide themselves.
+IN_PLANE = 0.35
+# Points of like apparent size that are looked at in the direction of each.
+LOOKED_AT = 4
+# Octaves of apparent size told apart; larger and smaller ones count as the last.
+OCTAVES = 12
+# Viewpoints of a trajectory that stand for all: the farthest from one another.
+MOST_VIEWPOINTS = 12
+# Distance from which a direction is looked along, in diagonals of the cloud.
+FAR_AWAY = 1000.0
+
+
+def visible(
+    points: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    viewpoint: NDArray[np.float64],
+    lines: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which points (n,) no other one hides from a viewpoint.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    spacing : (n,) float64
+        Mean distance of each point to its neighbours: it covers a disc of that size.
+    viewpoint : (3,) float64
+    lines : (n, 3) float64
+        Unit normals of either sign, roughly.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(2000).points
+    >>> seen = visible(ball, Neighbourhood(ball).spacing, np.array([0.0, 0.0, 9.0]), ball)
+    >>> bool(seen[ball[:, 2] > 0.3].all()), bool(seen[ball[:, 2] < -0.3].any())
+    (True, False)
+    """
+    offset = points - viewpoint
+    distance = np.linalg.norm(offset, axis=1)
+    seen = distance > 0
+    distance = np.maximum(distance, np.finfo(float).tiny)
+    direction = offset / distance[:, None]
+    size = COVER * spacing / distance
+    # A near point is apart from its neighbours by more, as seen from here, than the far ones behind it: each octave of
+    # sizes is searched by itself, or those behind would crowd it out.
+    octave = np.floor(np.log2(size))
+    octave = np.clip(octave, octave.max() - OCTAVES, octave.max())
+    for this in np.unique(octave):
+        rows = np.flatnonzero(octave == this)
+        count = min(LOOKED_AT, len(rows))
+        apart, near = KDTree(direction[rows]).query(direction, k=count)
+        blocker = rows[near.reshape(len(points), count)]
+        gap = distance[:, None] - distance[blocker]
+        hidden = (apart.reshape(len(points), count) < size[blocker]) & (
+            gap > BEHIND * np.maximum(spacing[:, None], spacing[blocker])
+        )
+        if hidden.any():
+            some = np.flatnonzero(hidden.any(axis=1))
+            off = np.abs(np.einsum("nkd,nd->nk", points[blocker[some]] - points[some, None], lines[some]))
+            hidden[some] &= off > IN_PLANE * np.maximum(spacing[some, None], spacing[blocker[some]])
+        seen &= ~hidden.any(axis=1)
+    return np.asarray(seen)
+
+
+def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum (n, 3) of the unit directions in which each point is seen; of length 0 where no sensor sees it.
+
+    `lines` (n, 3) are unit normals of either sign, roughly, such as those of planes.
+    """
+    points = around.points
+    total = np.zeros_like(points)
+    views = np.empty((0, 3)) if sensors.viewpoints is None else np.asarray(sensors.viewpoints)
+    told = np.zeros(len(points), dtype=np.bool_)
+    if sensors.seen_from is not None:
+        rows = np.asarray(sensors.seen_from)
+        told = rows >= 0
+        total[told] = _toward(points[told], views[rows[told]])
+    if sensors.up is not None:
+        up = np.asarray(sensors.up) / np.linalg.norm(np.asarray(sensors.up))
+        views = np.concatenate([views, (points.mean(axis=0) + FAR_AWAY * up)[None]])
+    if not told.all():
+        for view in _spread(views):
+            seen = visible(points, around.spacing, view, lines) & ~told
+            total[seen] += _toward(points[seen], view)
+    return total
+
+
+def _toward(points: NDArray[np.float64], view: NDArray[np.float64]) -> NDArray[np.float64]:
+    offset = view - points
+    return np.asarray(offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
+def _spread(views: NDArray[np.float64]) -> NDArray[np.float64]:
+    """At most so many of the viewpoints: the first, then each time the one farthest from those taken."""
+    if len(views) <= MOST_VIEWPOINTS:
+        return views
+    taken = [int(np.argmax(np.linalg.norm(views - views.mean(axis=0), axis=1)))]
+    nearest = np.linalg.norm(views - views[taken[0]], axis=1)
+    while len(taken) < MOST_VIEWPOINTS:
+        taken.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(views - views[taken[-1]], axis=1))
+    return views[taken]

@@ -1,9 +1,14 @@
 """What users scan: rooms from inside, terrain, crates sampled at random, bores, strays, noise."""
 
 import numpy as np
+import pytest
 
 import face_plugin
 from face_plugin import estimate_normals, examples, shapes
+from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.patches import planes_of
+from face_plugin.sides.sensors import Sensors
+from face_plugin.sides.sights import sights
 
 
 def right(normals, truth):
@@ -105,6 +110,20 @@ def test_terrain_without_a_hint_has_one_side():
     terrain = examples.load("terrain", 3000)
     share = right(estimate_normals(terrain.points).normals, terrain.normals)
     assert max(share, 1.0 - share) >= 0.99
+
+
+@pytest.mark.parametrize("name", ["street", "frame"])
+def test_a_street_and_a_frame_without_a_hint_face_where_they_were_seen_from(name):
+    scan = examples.load(name)
+    assert right(estimate_normals(scan.points).normals, scan.normals) > 0.96
+
+
+def test_a_street_has_no_point_that_its_own_sheet_hides():
+    # The ground far off is seen at a few degrees: its points lie behind one another.
+    around = Neighbourhood(examples.load("street").points)
+    sensors = Sensors(examples.load("street").viewpoints)
+    seen = sights(around, sensors, planes_of(around).lines).any(axis=1)
+    assert seen.mean() > 0.9
 
 
 def test_a_crate_sampled_at_random_is_right_inside_and_loses_nothing():

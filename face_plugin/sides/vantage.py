@@ -31,7 +31,7 @@ FEWEST = 100
 # A place counts where it sees most of the points, face on: share of points, times the cosine, times how many agree.
 WORTH = 0.5
 # A place nearby must be clearly better than a direction from afar: a little better is chance.
-NEAR = 0.95
+NEAR = 0.98
 # Points that places are looked for with, and how many of the best are then tried with all points.
 LOOKED_WITH = 700
 TRIED = 2

@@ -75,14 +75,14 @@ class DipoleTree:
         (n, 3) float64
             Times 4 pi.
         """
-        return self._evaluate(normals, eps, opening)[:, :3]
+        return self._evaluate(normals, eps, opening)[:, : normals.shape[1]]
 
     def outward_and_number(
         self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """`outward` (n, 3) and `number` (n,) at the points, which cost no more together than one alone."""
         columns = self._evaluate(normals, eps, opening)
-        return columns[:, :3], columns[:, 3] / (4.0 * np.pi)
+        return columns[:, : normals.shape[1]], columns[:, 3] / (4.0 * np.pi)
 
     def number(
         self,

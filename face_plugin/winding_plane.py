@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from face_plugin.compiled import compiled
 from face_plugin.threads import in_threads
-from face_plugin.winding import OPENING, STACK, DipoleTree
+from face_plugin.winding import STACK, DipoleTree
 
 __all__ = ["PlaneTree"]
 
@@ -41,19 +41,6 @@ class PlaneTree(DipoleTree):
 
     def __init__(self, points: NDArray[np.float64], lengths: NDArray[np.float64]) -> None:
         super().__init__(np.column_stack([points, np.zeros(len(points))]), lengths)
-
-    def outward(
-        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
-    ) -> NDArray[np.float64]:
-        """Steepest descent of the winding number (n, 2), times 4 pi; as in space."""
-        return self._evaluate(normals, eps, opening)[:, :2]
-
-    def outward_and_number(
-        self, normals: NDArray[np.float64], eps: NDArray[np.float64], opening: float = OPENING
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """`outward` (n, 2) and `number` (n,) at the points, which cost no more together than one alone."""
-        columns = self._evaluate(normals, eps, opening)
-        return columns[:, :2], columns[:, 3] / (4.0 * np.pi)
 
     def _evaluate(
         self,

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from face_plugin.faraday.gradient import ROUNDING, FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.result import Side
-from face_plugin.sides.graph import couplings, neighbours_around
+from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 from face_plugin.sides.vantage import FEWEST, is_open
 
 __all__ = ["open_parts", "parts", "told_by"]
@@ -44,9 +42,8 @@ def parts(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.int
     length = np.linalg.norm(around.points[edges.first] - around.points[edges.second], axis=1)
     spacing = np.maximum(around.spacing[edges.first], around.spacing[edges.second])
     joined = length < REACH * spacing * couplings(around.points, normals, edges) ** 2
-    ends = (edges.first[joined], edges.second[joined])
-    link = coo_matrix((np.ones(len(ends[0])), ends), shape=(len(around), len(around)))
-    return np.asarray(connected_components(link, directed=False)[1], dtype=np.intp)
+    everyone = np.ones(len(around), dtype=np.bool_)
+    return connected_parts(everyone, Edges(edges.first[joined], edges.second[joined]))[0]
 
 
 def open_parts(part: NDArray[np.intp], field: FieldAtPoints) -> NDArray[np.bool_]:

@@ -186,8 +186,9 @@ def refine(
     side = blind = _sides_by_field(around, field, sheets or find_sheets(around), planes, still, plate)
     if sights is not None:
         side = sides_by_sensors(around, sights, unit(blind), planes)
-    elif is_open(field.difference) and not (plate | still).any():
-        side = _sides_as_seen(around, field, side, planes)
+    elif is_open(field.difference) and not still.any():
+        # What is thinner than the spacing has both of its sides in one place: only the field tells them apart.
+        side = np.where(plate[:, None], side, _sides_as_seen(around, field, side, planes))
     del planes
 
     # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending

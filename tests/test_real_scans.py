@@ -118,6 +118,43 @@ def test_a_street_and_a_frame_without_a_hint_face_where_they_were_seen_from(name
     assert right(estimate_normals(scan.points).normals, scan.normals) > 0.96
 
 
+def row_of_houses(density, seed):
+    """Fronts of houses that stand back and forward, the walls between them, and the street before them."""
+    rng = np.random.default_rng(seed)
+    depths, widths, heights = (0.0, 1.2, -0.8, 0.6), (6.0, 5.0, 7.0, 4.0), (8.0, 10.0, 7.0, 9.0)
+    parts, x = [rectangle((-2, -8, 0), (26, 0, 0), (0, 7, 0), density / 2, rng)], 0.0
+    for k, (depth, width, height) in enumerate(zip(depths, widths, heights, strict=True)):
+        parts.append(rectangle((x, depth, 0), (width, 0, 0), (0, 0, height), density, rng))
+        x += width
+        if k + 1 < len(depths):
+            step = depths[k + 1] - depth
+            parts.append(rectangle((x, depth, 0), (0, step, 0), (0, 0, min(height, heights[k + 1])), density, rng))
+    return joined(parts)
+
+
+def trees_from_above(density, seed):
+    """Ground seen from above, but not below the crowns, of which the upper halves are seen."""
+    rng = np.random.default_rng(seed)
+    ground = rectangle((0, 0, 0), (30, 0, 0), (0, 30, 0), density, rng)
+    shown, parts = np.ones(len(ground[0]), dtype=bool), []
+    for x in (4.0, 12.0, 20.0, 26.0):
+        for y in (5.0, 14.0, 24.0):
+            radius = rng.uniform(1.2, 2.2)
+            up = rng.normal(size=(round(density * 2 * np.pi * radius**2), 3))
+            up[:, 2] = np.abs(up[:, 2])
+            up /= np.linalg.norm(up, axis=1, keepdims=True)
+            parts.append((np.array([x, y, 6.0]) + radius * up, up))
+            shown &= np.hypot(ground[0][:, 0] - x, ground[0][:, 1] - y) > radius
+    return joined([(ground[0][shown], ground[1][shown]), *parts])
+
+
+@pytest.mark.parametrize("scene", [row_of_houses(30.0, 0), trees_from_above(9.0, 0)], ids=["houses", "trees"])
+def test_parts_of_an_open_scan_are_on_one_side_without_a_hint(scene):
+    points, truth = scene
+    share = right(estimate_normals(points).normals, truth)
+    assert max(share, 1.0 - share) > 0.995
+
+
 def test_a_street_has_no_point_that_its_own_sheet_hides():
     # The ground far off is seen at a few degrees: its points lie behind one another.
     around = Neighbourhood(examples.load("street").points)

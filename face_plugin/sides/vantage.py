@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.clusters import cluster_signs
+from face_plugin.sides.clusters import better_signs, cluster_signs
 from face_plugin.sides.facing import SIGHT, facing
 from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.sensors import Sensors
@@ -30,6 +30,9 @@ SHIELDED = 0.92
 FEWEST = 100
 # A place counts where it sees most of the points, face on: share of points, times the cosine, times how many agree.
 WORTH = 0.5
+# Where couplings alone, without field and winding number, tell the same sides at 98 of 100 points (mean sign), a place
+# must see more to turn a part: from beyond a wall of a street most of that is seen as well, and the wall from behind.
+WORTH_AGREED, AGREED = 0.75, 0.96
 # A place nearby must be clearly better than a direction from afar: a little better is chance.
 NEAR = 0.98
 # Points that places are looked for with, and how many of the best are then tried with all points.
@@ -57,7 +60,17 @@ def sides_from_vantage(
 ) -> NDArray[np.float64]:
     """Turn normals (n, 3) to be on one side as seen from the best place; as they are where no place is good.
 
-    That is the side that faces the place. `planes` are those of `around`, where they are known.
+    That is the side that faces the place. Parts that are on the other side are turned where that is better than leaving
+    them: where more is seen of them than couples them to the rest.
+
+    Parameters
+    ----------
+    around : Neighbourhood
+        Of n points.
+    normals : (n, 3) float64
+        Unit normals.
+    planes : Planes, optional
+        Those of `around`, where they are known.
 
     Examples
     --------
@@ -70,21 +83,24 @@ def sides_from_vantage(
     1.0
     """
     lines, edges, coupling = planes or planes_of(around)
-    best, score = None, WORTH * NEAR
+    known = np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)
+    lines, coupling = lines * known[:, None], coupling * known[edges.first] * known[edges.second]
+    agreed = abs(float(cluster_signs(len(around), edges, coupling).mean()))
+    best, score = np.ones(len(around)), WORTH * NEAR
     for place in _places(around.points, lines):
         evidence = facing(lines, sights(around, place, lines))
         weight = NEAR if place.up is None else 1.0
         # No more than what is seen at all: most places need no more looking at.
         if weight * np.abs(evidence).mean() <= score:
             continue
-        sign = cluster_signs(len(around), edges, coupling, SIGHT * evidence)
-        reached = weight * float((evidence * sign).mean())
+        # The sides that are known may all be those of the back: what is turned then is turned from that.
+        whole = 1.0 if evidence.sum() >= 0 else -1.0
+        sign = better_signs(len(around), edges, coupling, whole * SIGHT * evidence)
+        reached = weight * whole * float((evidence * sign).mean())
         if reached > score:
-            best, score = sign, reached
-    if best is None:
-        return normals
-    side = np.where(np.einsum("nd,nd->n", lines * best[:, None], normals) < 0, -1.0, 1.0)
-    return np.asarray(normals * side[:, None])
+            trusted = agreed < AGREED or reached > WORTH_AGREED * NEAR
+            best, score = whole * (sign if trusted else np.ones(len(around))), reached
+    return np.asarray(normals * best[:, None])
 
 
 def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sensors]:

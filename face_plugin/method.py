@@ -31,6 +31,7 @@ from face_plugin.sides.enclosure import DARK
 from face_plugin.sides.facing import resettled, sides_by_sensors
 from face_plugin.sides.parts import open_parts, parts
 from face_plugin.sides.patches import Planes, planes_of, turned_patches
+from face_plugin.sides.reach import out_of_reach
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.steps import turn_sides
 from face_plugin.sides.vantage import is_open, sides_from_vantage
@@ -266,7 +267,12 @@ def _sides_by_field(
         elif along is None:
             # Asked again of the same sides, it would say the same.
             break
-    return side
+    if still.any():
+        # Of a cloud seen in part, it is not known where outside is.
+        return side
+    # In a cavity the field may be a leak, and all that is around agree on the wrong side.
+    turned = out_of_reach(around, unit(side), field.strength) & ~kept
+    return np.where(turned[:, None], -side, side)
 
 
 def _sides_as_seen(

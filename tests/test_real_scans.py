@@ -170,6 +170,23 @@ def test_a_crate_sampled_at_random_is_right_inside_and_loses_nothing():
     assert (~result.kept).mean() <= 0.01
 
 
+def test_a_pipe_whose_wall_is_as_thin_as_the_spacing_is_right_inside():
+    rng = np.random.default_rng(0)
+    parts = []
+    for radius, side in ((0.2, 1.0), (0.16, -1.0)):
+        angle = rng.uniform(0, 2 * np.pi, round(3500 * radius / 0.36))
+        out = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+        parts.append((radius * out + np.outer(rng.uniform(0, 3, len(angle)), [0, 0, 1.0]), side * out))
+    for height, side in ((0.0, -1.0), (3.0, 1.0)):
+        angle, radius = rng.uniform(0, 2 * np.pi, 24), np.sqrt(rng.uniform(0.16**2, 0.2**2, 24))
+        rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(24, height)], axis=1)
+        parts.append((rim, np.tile([0, 0, side], (24, 1))))
+    points, truth = joined(parts)
+    result = estimate_normals(points, filter_interior=True)
+    assert right(result.normals, truth) > 0.97
+    assert result.interior.mean() < 0.01
+
+
 def test_strays_around_a_sphere_are_set_aside_and_nothing_is_lost():
     count = 3000
     shape = shapes.with_outliers(shapes.sphere(count), 0.01, seed=3)

@@ -27,7 +27,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 
-__all__ = ["Planes", "closure", "planes_of", "turned_patches"]
+__all__ = ["SMALLEST", "Planes", "closure", "planes_of", "turned_patches", "winding_number"]
 
 # Neighbours of the plane that a sheet is taken for, as hosts take by default.
 PLANE_NEIGHBOURS = 30
@@ -60,8 +60,20 @@ def closure(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.f
     >>> bool(closure(Neighbourhood(ball.points), ball.normals).min() > 0.7)
     True
     """
-    number = around.tree.number(normals, WIDTH * around.spacing, opening=OPENING)
-    return np.asarray(np.clip(1.0 - 2.0 * np.abs(number - 0.5), 0.0, 1.0))
+    return np.asarray(np.clip(1.0 - 2.0 * np.abs(winding_number(around, normals) - 0.5), 0.0, 1.0))
+
+
+def winding_number(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Winding number (n,) of the others at each point: 1/2 on a closed surface, 3/2 or -1/2 where that is inside out.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> bool(np.abs(winding_number(Neighbourhood(ball.points), ball.normals) - 0.5).max() < 0.2)
+    True
+    """
+    return np.asarray(around.tree.number(normals, WIDTH * around.spacing, opening=OPENING))
 
 
 class Planes(NamedTuple):

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import ALPHAS
+from face_plugin.sides.graph import Edges, connected_parts
+from face_plugin.sides.patches import SMALLEST
 
 __all__ = ["automatic_alpha", "enclosed", "threshold"]
 
@@ -42,6 +44,8 @@ AROUND = 6
 ACROSS = -0.5
 # Width of the kernel of the winding number, in spacings: the wider, the deeper a point must lie to count as enclosed.
 ENCLOSED_WIDTH = 0.5
+# Points inside are joined to so many of their nearest.
+JOINED = 8
 # Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which
 # rises as the numbers get clearer. No dent that is open to the outside is as dark.
 DARK = 1e-4
@@ -102,7 +106,10 @@ def enclosed(
     step_outward[rows] += (STEP * spacing[rows] + band)[:, None] * normals[rows]
     for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
         found &= tree.number(dipoles, np.where(found, width, 0.0), step_outward) > level
-    return found
+    # What lies inside is a surface of its own. Fewer points are the deepest of a noisy sheet, or of a narrow slot.
+    joined = around.neighbour[:, 1 : JOINED + 1]
+    edges = Edges(np.repeat(np.arange(len(points)), joined.shape[1]), joined.ravel())
+    return np.asarray(connected_parts(found, edges, SMALLEST)[0] >= 0)
 
 
 def _out_of_creases(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.float64]:

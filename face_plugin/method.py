@@ -271,7 +271,7 @@ def _sides_by_field(
         # Of a cloud seen in part, it is not known where outside is.
         return side
     # In a cavity the field may be a leak, and all that is around agree on the wrong side.
-    turned = out_of_reach(around, unit(side), field.strength) & ~kept
+    turned = out_of_reach(around, unit(side)) & ~kept
     return np.where(turned[:, None], -side, side)
 
 

@@ -17,12 +17,12 @@ def test_confidence_is_high_on_a_clean_sphere_and_within_bounds():
 
 
 def test_the_least_confident_points_are_wrong_most_often():
-    # A cup whose wall is as thin as the spacing and four diameters deep: beyond what the field can tell.
-    cup = shapes.cup(3000, 0, depth=4.0, thickness=0.1)
-    result = FaCE(cup.points).result()
-    wrong = (result.normals * cup.normals).sum(axis=1) < 0
-    assert wrong.mean() > 0.1
-    # Measured: 1.9 times as often as anywhere, on this cup and on two others.
+    # Noise three times as large as the spacing: deep in the band in which points scatter, no one can tell their side.
+    torus = shapes.with_noise(shapes.torus(2000, 0), 0.2)
+    result = FaCE(torus.points).result()
+    wrong = (result.normals * torus.normals).sum(axis=1) < 0
+    assert wrong.mean() > 0.02
+    # Measured: 2.0 to 2.2 times as often as anywhere, over four seeds.
     least = np.argsort(result.confidence)[: len(wrong) // 3]
     assert wrong[least].mean() > 1.5 * wrong.mean()
 

@@ -267,8 +267,8 @@ def _sides_by_field(
         elif along is None:
             # Asked again of the same sides, it would say the same.
             break
-    if still.any():
-        # Of a cloud seen in part, it is not known where outside is.
+    if still.any() or is_open(field.difference):
+        # Of a cloud seen in part, it is not known where outside is; and around an open sheet all is outside.
         return side
     # In a cavity the field may be a leak, and all that is around agree on the wrong side.
     turned = out_of_reach(around, unit(side)) & ~kept

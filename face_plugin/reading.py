@@ -17,7 +17,7 @@ from face_plugin.params import Params
 from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.nesting import Nesting, cavities
-from face_plugin.sides.parts import open_parts, parts, told_by
+from face_plugin.sides.parts import borne_out, open_parts, parts, told_by
 from face_plugin.sides.patches import planes_of
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
@@ -84,10 +84,15 @@ class Reading:
         return found if self.looked_at is None else found & ~self.looked_at
 
     @cached_property
-    def confidence(self) -> NDArray[np.float64]:
-        """Confidence (m,) in the side of the normals."""
+    def agreement(self) -> NDArray[np.float64]:
+        """How far (m,) field, or sensors, and points agree on the side of the normals."""
         # The field knows nothing of cavities.
         return confidence(self.around, witness(self.seen.votes, self.sights), self.as_solids)
+
+    @property
+    def confidence(self) -> NDArray[np.float64]:
+        """Confidence (m,) in the side of the normals."""
+        return self.agreement * borne_out(self.part, self.sides, self.as_solids, self.seen)
 
     @cached_property
     def part(self) -> NDArray[np.intp]:

@@ -57,7 +57,8 @@ class Result:
     """(n,) E_max at the point's ball; unshielded space has 1."""
     confidence: NDArray[np.floating]
     """(n,) confidence in the side of the normal, in [0, 1]: the agreement of field, or sensors, and points, times the
-    jump of the winding number across the point; see `face_plugin.sides.confidence`."""
+    jump of the winding number across the point; see `face_plugin.sides.confidence`. Where the side was chosen, times
+    what the field says for it, which is next to nothing."""
     interior: NDArray[np.bool_] | None
     """(n,) whether the point lies inside the object; None where it was not asked for."""
     timings: dict[str, float]

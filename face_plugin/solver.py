@@ -122,7 +122,7 @@ class FaCE(Sculptable):
         trust, rows, lines = checked_trust(trusted, self.cloud.size), self.cloud.rows, self.frame.rotate(lines)
         reading = self._reading
         # What a sensor saw is certain, whatever the field says.
-        sure = reading.confidence if reading.sights is None else np.where(reading.sights.any(1), 1, reading.confidence)
+        sure = reading.agreement if reading.sights is None else np.where(reading.sights.any(1), 1, reading.agreement)
         evidence = np.einsum("nd,nd->n", lines, reading.normals[rows]) * np.where(self.strays, 0.0, sure[rows])
         side = sides_of_lines(reading.around, rows, lines, evidence, trust)
         return np.where(side[:, None] < 0, -given, given)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from face_plugin import FaCE, shapes
+import face_plugin
+from face_plugin import FaCE, examples, shapes
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.confidence import confidence
 
@@ -32,3 +34,20 @@ def test_confidence_of_some_points_is_that_among_all():
     around = Neighbourhood(ball.points)
     every = confidence(around, ball.normals, ball.normals)
     assert np.array_equal(confidence(around, ball.normals, ball.normals, rows), every[rows])
+
+
+@pytest.mark.parametrize("gap", [0.01, 0.1, 0.3])
+def test_plates_whose_layers_nobody_can_tell_apart_say_so(gap):
+    # Two lattices of spacing 1: half of the normals are on the wrong side, and no witness says which.
+    rows = np.stack(np.meshgrid(np.arange(24.0), np.arange(24.0)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([np.column_stack([rows, np.full(len(rows), height)]) for height in (0.0, gap)])
+    thick = points * [1.0, 1.0, 2.0 / gap]
+    assert np.median(FaCE(points).result().confidence) < 0.05
+    assert np.median(FaCE(thick).result().confidence) > 0.8
+
+
+def test_a_side_that_was_chosen_is_not_trusted_and_one_that_was_seen_is():
+    terrain = examples.load("terrain", 4000)
+    blind = face_plugin.estimate_normals(terrain.points)
+    seen = face_plugin.estimate_normals(terrain.points, up=terrain.up)
+    assert np.median(blind.confidence) < 0.3 < 0.7 < np.median(seen.confidence)

@@ -11,7 +11,7 @@ from face_plugin.result import Side
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 from face_plugin.sides.vantage import FEWEST, is_open
 
-__all__ = ["open_parts", "parts", "told_by"]
+__all__ = ["borne_out", "open_parts", "parts", "told_by"]
 
 # Spacings from which neighbours are not of one part, times the square of what couples them. Within a plane scan lines
 # are of one part, seven times as far apart as the points along them; across a right angle, where the coupling is 0.2 to
@@ -109,3 +109,29 @@ def told_by(
     if seen is not None:
         side[np.bincount(part, seen) > np.where(closed, SEEN_CLOSED, SEEN_OPEN) * count] = Side.SENSORS
     return side[part]
+
+
+def borne_out(
+    part: NDArray[np.intp], sides: NDArray[np.uint8], normals: NDArray[np.float64], field: FieldAtPoints
+) -> NDArray[np.float64]:
+    """Tell how far (n,) the field bears out the side of the part of each point, in [0, 1].
+
+    It is 1 where field or sensors told the side. Where the side was chosen, it is the mean of what the field says for
+    it, which is near 0 on an open sheet, and on two layers that lie so close that no field tells them apart.
+
+    Parameters
+    ----------
+    part, sides
+        As of `parts` and `told_by`.
+    normals : (n, 3) float64
+    field : FieldAtPoints
+
+    Examples
+    --------
+    >>> up = np.tile([0.0, 0.0, 1.0], (4, 1))
+    >>> field = FieldAtPoints(np.ones(4), up * np.array([1, -1, 1, 1])[:, None], np.array([1.0, 0.5, 1.0, 1.0]))
+    >>> borne_out(np.array([0, 0, 1, 1]), np.array([0, 0, 1, 1], dtype=np.uint8), up, field)
+    array([0.25, 0.25, 1.  , 1.  ])
+    """
+    says = np.bincount(part, field.difference * np.einsum("nd,nd->n", field.votes, normals)) / np.bincount(part)
+    return np.where(sides == Side.CHOSEN, np.clip(says, 0.0, 1.0)[part], 1.0)

@@ -7,6 +7,8 @@ the sampling. A point with free space on one side, and none on the other, knows 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
@@ -41,7 +43,7 @@ FITS = 1 / 3
 def out_of_reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Find patches to turn (n,): what lies behind them is reached from outside, and what lies in front is not.
 
-    Looked for only where the winding number says that something is inside out.
+    Looked for only where the winding number says that something is inside out, and is more than a crease.
 
     Parameters
     ----------
@@ -63,7 +65,8 @@ def out_of_reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray
     found = np.zeros(len(around), dtype=np.bool_)
     edges = neighbours_around(around, normals)
     off = np.abs(winding_number(around, normals) - 0.5)
-    if connected_parts(off > INSIDE_OUT, edges, SMALLEST)[1] == 0:
+    # In a sharp crease the number is off as well, along a line of points; a line across the cloud has the root of n.
+    if connected_parts(off > INSIDE_OUT, edges, max(SMALLEST, math.isqrt(len(around))))[1] == 0:
         return found
     reached = reach(around, normals)
     coupling = couplings(around.points, normals, edges)

@@ -14,7 +14,7 @@ from face_plugin.cloud import morton_distinct
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.nesting import Nesting, cavities
-from face_plugin.sides.parts import open_parts, parts, told_by
+from face_plugin.sides.parts import borne_out, open_parts, parts, told_by
 from face_plugin.threads import KDTree
 from face_plugin.tiles.store import Store
 
@@ -31,6 +31,8 @@ class Known:
     """(k,) whether the part of each encloses nothing."""
     sides: NDArray[np.uint8]
     """(k,) what told the sides of its normals."""
+    borne_out: NDArray[np.float64]
+    """(k,) how far the field bears these out."""
     nesting: Nesting | None
     """Bodies within others, where they are cavities."""
 
@@ -51,7 +53,8 @@ def known_of(store: Store) -> Known:
     opened = open_parts(part, field)
     seen = found["seen"] > 0 if "seen" in found else None
     nesting = None if store.params.nested == "solid" else cavities(around, oriented, part, seen)
-    return Known(around.points, opened, told_by(part, opened, oriented, field, seen), nesting)
+    sides = told_by(part, opened, oriented, field, seen)
+    return Known(around.points, opened, sides, borne_out(part, sides, oriented, field), nesting)
 
 
 def _of_tile(store: Store, tile: int) -> dict[str, NDArray[np.float64]]:

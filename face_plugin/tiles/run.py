@@ -257,6 +257,7 @@ def collect(store: Store, folder: Path | None = None) -> dict[str, NDArray[Any]]
         out["strays"][row] = solved["stray"]
         like = known.nearest(store.tile_points(tile))
         out["open"][row], out["sides"][row] = known.open[like], known.sides[like]
+        out["confidence"][row] *= known.borne_out[like]
         if known.nesting is not None:
             turned = row[known.nesting.turned[like]]
             out["normals"][turned] *= -1

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from face_plugin.sides.clusters import SHARE, better_signs, cluster_signs
+from face_plugin.sides.clusters import better_signs, cluster_signs
+from face_plugin.sides.contraction import SHARE
 from face_plugin.sides.graph import Edges
 
 Array = NDArray[np.float64]
 
 
-def contracted(count: int, edges: Edges, coupling: Array) -> Array:
+def slowly_contracted(count: int, edges: Edges, coupling: Array) -> Array:
     """Signs (count,), by looking at all edges for the heaviest, joining the ends of such ones, and starting over."""
     weight = {
         (int(min(a, b)), int(max(a, b))): float(w) for a, b, w in zip(edges.first, edges.second, coupling, strict=True)
@@ -51,14 +52,14 @@ def test_signs_with_evidence_are_those_of_the_slow_way(seed):
     evidence = 0.3 * np.random.default_rng(seed).normal(size=count)
     everyone = np.arange(count)
     with_space = Edges(np.concatenate([edges.first, everyone]), np.concatenate([edges.second, np.full(count, count)]))
-    sign = contracted(count + 1, with_space, np.concatenate([coupling, evidence]))
+    sign = slowly_contracted(count + 1, with_space, np.concatenate([coupling, evidence]))
     assert np.array_equal(cluster_signs(count, edges, coupling, evidence), (sign * sign[count])[:count])
 
 
 @pytest.mark.parametrize("seed", range(100))
 def test_without_evidence_each_component_is_as_of_the_slow_way_and_keeps_most_of_its_lines(seed):
     count, edges, coupling = random_graph(seed)
-    found, expected = cluster_signs(count, edges, coupling), contracted(count, edges, coupling)
+    found, expected = cluster_signs(count, edges, coupling), slowly_contracted(count, edges, coupling)
     joined = coo_matrix((np.ones(len(coupling)), (edges.first, edges.second)), shape=(count, count))
     components, label = connected_components(joined, directed=False)
     for component in range(components):

@@ -187,6 +187,46 @@ def test_a_pipe_whose_wall_is_as_thin_as_the_spacing_is_right_inside():
     assert result.interior.mean() < 0.01
 
 
+def bottle(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Turn a profile, up the outside and down the inside: the neck is six walls wide, and the walls a spacing thick."""
+    profile = np.array(
+        [
+            [0, 0],
+            [0.4, 0],
+            [0.4, 1.2],
+            [0.12, 1.5],
+            [0.12, 2],
+            [0.08, 2],
+            [0.08, 1.5],
+            [0.36, 1.2],
+            [0.36, 0.04],
+            [0, 0.04],
+        ]
+    )
+    start, step = profile[:-1], np.diff(profile, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    area = length * (2 * start + step)[:, 0]
+    rng = np.random.default_rng(0)
+    piece = np.repeat(np.arange(len(step)), rng.multinomial(count, area / area.sum()))
+    start, step, turn = start[piece], step[piece], rng.uniform(0, 2 * np.pi, count)
+    # Even by area: the square of the radius is even along a cone.
+    inner, outer, u = start[:, 0] ** 2, (start + step)[:, 0] ** 2, rng.random(count)
+    slanted = np.abs(step[:, 0]) > 0
+    along = np.where(slanted, np.sqrt(inner + u * (outer - inner)) - start[:, 0], 0) / np.where(slanted, step[:, 0], 1)
+    along = np.where(slanted, along, u)
+    radius, height = (start + along[:, None] * step).T
+    out = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    normal = np.stack([step[:, 1], -step[:, 0]], axis=1) / length[piece, None]
+    return np.column_stack([radius[:, None] * out, height]), np.column_stack([normal[:, :1] * out, normal[:, 1]])
+
+
+def test_a_bottle_is_right_inside_though_nothing_but_its_neck_leads_there():
+    points, truth = bottle(9000)
+    result = estimate_normals(points, filter_interior=True)
+    assert right(result.normals, truth) > 0.99
+    assert result.interior.mean() < 0.001
+
+
 def test_strays_around_a_sphere_are_set_aside_and_nothing_is_lost():
     count = 3000
     shape = shapes.with_outliers(shapes.sphere(count), 0.01, seed=3)

@@ -73,7 +73,9 @@ def arguments(description: str | None, points: int) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=points, help="points of a generated cloud")
     parser.add_argument(
-        "--inputs", type=Path, help="folder of .npz files with points, normals and valid, instead of generated clouds"
+        "--inputs",
+        type=Path,
+        help="folder of .npz files with points, normals and, where not all count, valid, instead of generated clouds",
     )
     parser.add_argument("--only", default="*", help="names of the clouds, with wildcards; several: a,b")
     parser.add_argument("--output", type=Path, default=Path("out"), help="folder for what is written")
@@ -105,7 +107,8 @@ def read(path: Path) -> Case:
     """Case of a file, named ``category__name.npz`` or ``name.npz``."""
     with np.load(path) as data:
         clean = "__" not in path.stem or path.stem.startswith("clean__")
-        return Case(path.stem, data["points"], data["normals"].astype(np.float64), data["valid"], clean)
+        valid = data["valid"] if "valid" in data else np.ones(len(data["points"]), dtype=np.bool_)
+        return Case(path.stem, data["points"], data["normals"].astype(np.float64), valid, clean)
 
 
 def degrees(a: Array, b: Array) -> Array:

@@ -28,6 +28,23 @@ def test_gmsh_leaves_broken_pipes_to_python():
     os.close(write)
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGPIPE, signal.SIGHUP])
+def test_gmsh_leaves_signals_to_the_handlers_of_the_program(number):
+    """It sets SIGTERM to end the process: nothing is closed then, and temporary files stay."""
+    script = (
+        "import os, signal, sys\n"
+        "from face_plugin.faraday.meshers.delaunay import tetrahedralize\n"
+        "from face_plugin.shapes import sphere\n"
+        "number = int(sys.argv[1])\n"
+        "signal.signal(number, lambda *_: print('heard', flush=True))\n"
+        "tetrahedralize(sphere(100).points, 'gmsh')\n"
+        "os.kill(os.getpid(), number)\n"
+        "print('alive', flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, str(int(number))], capture_output=True, text=True)
+    assert done.stdout.split() == ["heard", "alive"], done
+
+
 def _alive(pid):
     try:
         os.kill(pid, 0)

@@ -7,9 +7,7 @@ vertices of one ball, are dropped. Free vertices from a graded octree take the p
 
 from __future__ import annotations
 
-import ctypes
 import logging
-import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +23,7 @@ from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box, Filling
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.meshers.boundary import ball_volumes, oriented
+from face_plugin.faraday.meshers.signals import same_signals
 
 __all__ = ["delaunay_mesh", "gmsh_loads", "tetrahedralize"]
 
@@ -186,23 +185,13 @@ def _gmsh() -> ModuleType | None:
     return gmsh  # type: ignore[no-any-return]
 
 
-def _initialize(gmsh: ModuleType) -> None:
-    """Initialise gmsh, and undo what it does to signals."""
-    # interruptible=True would take SIGINT away from the user's program.
-    gmsh.initialize(interruptible=False)
-    # Writing to a closed pipe would end the process from now on, where Python raises BrokenPipeError. Python
-    # itself may set a signal in its main thread only, which this need not be.
-    if hasattr(signal, "SIGPIPE") and signal.getsignal(signal.SIGPIPE) == signal.SIG_IGN:
-        restore = ctypes.CDLL(None).signal
-        restore.argtypes, restore.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
-        restore(int(signal.SIGPIPE), int(signal.SIG_IGN))
-
-
 @contextmanager
 def _own_gmsh_state(gmsh: ModuleType) -> Iterator[None]:
     """Work in a model and with options of our own: gmsh is one global state, and the user may share it."""
     if not gmsh.isInitialized():
-        _initialize(gmsh)
+        # It would end the process on a closed pipe and on SIGTERM, where Python raises; interruptible, on SIGINT too.
+        with same_signals():
+            gmsh.initialize(interruptible=False)
     options = {"General.Terminal": 0.0, "Mesh.RandomFactor3D": 0.0}
     before = {name: gmsh.option.getNumber(name) for name in options}
     current = gmsh.model.getCurrent()

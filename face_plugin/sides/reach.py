@@ -11,11 +11,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from face_plugin.faraday.meshers.delaunay import tetrahedralize
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.alpha_shape import outside_alpha_shape
 from face_plugin.sides.clusters import cluster_signs, where_better
 from face_plugin.sides.graph import connected_parts, couplings, neighbours_around
 from face_plugin.sides.patches import SMALLEST, winding_number
@@ -110,7 +109,7 @@ def reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.flo
     # Points in rows are the worst case of meshers.
     nudge = np.random.default_rng(0).uniform(-NUDGE, NUDGE, points.shape) * around.spacing[:, None]
     corners = tetrahedralize(points + nudge)
-    reached = _reached(points, corners, wide)
+    reached = outside_alpha_shape(points, corners, wide)
     centre = points[corners].mean(axis=1)
     # Behind and in front of each point: tetrahedra, and those of them that are reached.
     count, free = np.zeros((2, len(points))), np.zeros((2, len(points)))
@@ -122,56 +121,3 @@ def reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.flo
     # Beyond the hull there are none.
     share = np.where(count > 0, free / np.maximum(count, 1), 1.0)
     return np.asarray(share[1] - share[0])
-
-
-def _reached(points: NDArray[np.float64], corners: NDArray[np.int32], wide: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which tetrahedra (t,) free space gets to, through facets that a ball of the mean of `wide` (n,) passes.
-
-    That is what the alpha shape of this radius leaves open (Edelsbrunner and Muecke 1994): the circle around a facet is
-    wider, or, where the least ball around it holds a corner beside it, the spheres around both tetrahedra are.
-    """
-    outside, size = len(corners), len(points)
-    facet = np.sort(np.concatenate([np.delete(corners, k, axis=1) for k in range(4)]).astype(np.int64), axis=1)
-    of, apex = np.tile(np.arange(outside), 4), corners.T.ravel()
-    # Equal facets stand side by side then.
-    order = np.lexsort((facet[:, 2], facet[:, 0] * size + facet[:, 1]))
-    facet, of, apex = facet[order], of[order], apex[order]
-    same = np.append((facet[1:] == facet[:-1]).all(axis=1), False)
-    first = np.flatnonzero(~np.roll(same, 1))
-    beyond = np.where(same, np.roll(of, -1), outside)[first]
-    # A facet of the hull has one tetrahedron, whose corner stands for both.
-    apex = np.stack([apex, np.where(same, np.roll(apex, -1), apex)])[:, first]
-    facet, of = facet[first], of[first]
-    width = wide[facet].mean(axis=1)
-    centre, radius = _circles(*(points[facet[:, k]] for k in range(3)))
-    held = (np.linalg.norm(points[apex] - centre, axis=2) < radius).any(axis=0)
-    sphere = np.append(_spheres(*(points[corners[:, k]] for k in range(4))), np.inf)
-    through = np.where(held, np.minimum(sphere[of], sphere[beyond]), radius) > width
-    link = coo_matrix((np.ones(through.sum()), (of[through], beyond[through])), shape=(outside + 1, outside + 1))
-    label = connected_components(link, directed=False)[1]
-    return np.asarray(label[:outside] == label[outside])
-
-
-def _circles(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres (k, 3) and radii (k,) of the circles through three points (k, 3) each."""
-    u, v = b - a, c - a
-    n = np.cross(u, v)
-    uu, vv, nn = (np.einsum("kd,kd->k", x, x)[:, None] for x in (u, v, n))
-    offset = (np.cross(n, u) * vv + np.cross(v, n) * uu) / np.maximum(2.0 * nn, np.finfo(float).tiny)
-    return a + offset, np.linalg.norm(offset, axis=1)
-
-
-def _spheres(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Radii (k,) of the spheres through four points (k, 3) each."""
-    u, v, w = b - a, c - a, d - a
-    uu, vv, ww = (np.einsum("kd,kd->k", x, x)[:, None] for x in (u, v, w))
-    across = np.cross(v, w)
-    offset = uu * across + vv * np.cross(w, u) + ww * np.cross(u, v)
-    return np.asarray(
-        np.linalg.norm(offset, axis=1)
-        / np.maximum(2.0 * np.abs(np.einsum("kd,kd->k", u, across)), np.finfo(float).tiny)
-    )

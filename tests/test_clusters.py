@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from face_plugin.sides.clusters import better_signs, cluster_signs
-from face_plugin.sides.contraction import SHARE
+from face_plugin.sides.contraction import AT_ONCE
 from face_plugin.sides.graph import Edges
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ def slowly_contracted(count: int, edges: Edges, coupling: Array) -> Array:
     }
     cluster, sign = np.arange(count), np.ones(count)
     while weight and max(map(abs, weight.values())) > 0:
-        least = SHARE * max(map(abs, weight.values()))
+        least = AT_ONCE * max(map(abs, weight.values()))
         batch = sorted((pair for pair in weight if abs(weight[pair]) >= least), key=lambda pair: -abs(weight[pair]))
         # Named by points, as clusters change their names within a round.
         for a, b, side in [(a, b, np.sign(weight[a, b])) for a, b in batch]:

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from face_plugin.compiled import compiled
 
-__all__ = ["SHARE", "contracted"]
+__all__ = ["AT_ONCE", "contracted"]
 
 # Sums within this share of the largest are joined in one round, strongest first. At 0.7 weak joins come before the sums
 # that would have overruled them are complete.
-SHARE = 0.9
+AT_ONCE = 0.9
 
 
 def contracted(
@@ -92,7 +92,7 @@ def _contract(a, b, weight, cluster, sign, first, last, degree, after, key, valu
             entries -= 1
             _pop(heap, mass, entries)
             if heavy > 0.0 and abs(weight[e]) == heavy:
-                least = max(least, SHARE * heavy)
+                least = max(least, AT_ONCE * heavy)
                 ends[0, batch], ends[1, batch], side[batch] = a[e], b[e], 1.0 if weight[e] > 0.0 else -1.0
                 batch += 1
         for j in range(batch):

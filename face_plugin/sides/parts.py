@@ -102,10 +102,9 @@ def told_by(
     array([2, 0, 1, 1], dtype=uint8)
     """
     count = np.bincount(part)
-    # Of a closed part the field is not believed where sensors that saw others speak against it.
-    agreed = np.bincount(part, field.difference * np.einsum("nd,nd->n", field.votes, normals))
     closed = np.bincount(part, opened) == 0
-    side = np.where(closed & (agreed >= 0), Side.FIELD, Side.CHOSEN).astype(np.uint8)
+    # Of a closed part the field is not believed where sensors that saw others speak against it.
+    side = np.where(closed & (_field_says(part, normals, field) >= 0), Side.FIELD, Side.CHOSEN).astype(np.uint8)
     if seen is not None:
         side[np.bincount(part, seen) > np.where(closed, SEEN_CLOSED, SEEN_OPEN) * count] = Side.SENSORS
     return side[part]
@@ -133,5 +132,10 @@ def borne_out(
     >>> borne_out(np.array([0, 0, 1, 1]), np.array([0, 0, 1, 1], dtype=np.uint8), up, field)
     array([0.25, 0.25, 1.  , 1.  ])
     """
-    says = np.bincount(part, field.difference * np.einsum("nd,nd->n", field.votes, normals)) / np.bincount(part)
+    says = _field_says(part, normals, field) / np.bincount(part)
     return np.where(sides == Side.CHOSEN, np.clip(says, 0.0, 1.0)[part], 1.0)
+
+
+def _field_says(part: NDArray[np.intp], normals: NDArray[np.float64], field: FieldAtPoints) -> NDArray[np.float64]:
+    """Sum of what the field says for the normals of each part (p,), from -1 to 1 a point."""
+    return np.asarray(np.bincount(part, field.difference * np.einsum("nd,nd->n", field.votes, normals)), np.float64)

@@ -1,8 +1,8 @@
 """Reach: what free space gets to through gaps wider than the sampling is free space as well, however dark it is there.
 
 In a bottle, a vase or a shelf the field fades, and what is left of it may have come through the wall. The points alone
-tell: in their Delaunay tetrahedra, free space spreads from outside through each facet that is wider than the gaps of
-the sampling. A point with free space on one side, and none on the other, knows its side.
+tell: in their Delaunay tetrahedra, free space spreads from outside as a ball that is wider than the gaps of the
+sampling. A point with free space on one side, and none on the other, knows its side.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from face_plugin.sides.patches import SMALLEST, winding_number
 
 __all__ = ["out_of_reach", "reach"]
 
-# Radius of the circle around a facet from which it lets through, in spacings: the least, for even samplings, and so
-# much more a unit of the coefficient of variation of the nearest distances, which is 0.05 to 0.1 on even samplings and
-# 0.52 at random. There, one facet in ten thousand is wider.
+# Radius of the ball that free space spreads as, in spacings: the least, for even samplings, and so much more a unit of
+# the coefficient of variation of the nearest distances, which is 0.05 to 0.1 on even samplings and 0.52 at random.
+# There, the circle around one facet in ten thousand is wider.
 WIDE, WIDER = 1.25, 1.5
-# Points are moved by at most so many spacings before they are meshed.
-NUDGE = 1e-3
+# Points are moved by at most so many spacings before they are meshed: rows are the worst case of meshers.
+OUT_OF_ROWS = 1e-3
 # A point is inside out where the winding number of the others is farther than this from the surface's 1/2.
 INSIDE_OUT = 0.5
 # Weight of what is reached next to the couplings of a point to its neighbours, which are 1 at most each, when patches
@@ -106,9 +106,8 @@ def reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.flo
     """
     points, nearest = around.points, around.distance[:, 1]
     wide = (WIDE + WIDER * float(nearest.std() / nearest.mean())) * around.spacing
-    # Points in rows are the worst case of meshers.
-    nudge = np.random.default_rng(0).uniform(-NUDGE, NUDGE, points.shape) * around.spacing[:, None]
-    corners = tetrahedralize(points + nudge)
+    moved = np.random.default_rng(0).uniform(-OUT_OF_ROWS, OUT_OF_ROWS, points.shape) * around.spacing[:, None]
+    corners = tetrahedralize(points + moved)
     reached = outside_alpha_shape(points, corners, wide)
     centre = points[corners].mean(axis=1)
     # Behind and in front of each point: tetrahedra, and those of them that are reached.

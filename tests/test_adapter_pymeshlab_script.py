@@ -210,3 +210,46 @@ def test_the_command_line_says_what_is_wrong(tmp_path, capsys, source, steps, ta
     assert main(["script", str(tmp_path / source), path, "-o", str(tmp_path / target), "--quiet"]) == code
     assert "face: error:" in capsys.readouterr().err
     assert not (tmp_path / target).exists()
+
+
+@pytest.mark.parametrize("title", ["NXS Build", "Export to Sketchfab", "Export active rasters cameras to file"])
+def test_a_script_may_not_write_files_of_its_own(tmp_path, title):
+    path = script(tmp_path, NORMALS, f' <filter name="{title}"/>\n')
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(ValueError, match=rf"script.mlx: step 2 \({title}\) writes or sends files"):
+        face.run_filter_script(scan(), path)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+TEXTURE = (
+    ' <filter name="Parametrization: Trivial Per-Triangle">\n'
+    '  <Param type="RichInt" name="textdim" value="64" description="" tooltip=""/>\n'
+    " </filter>\n"
+    ' <filter name="Transfer: Vertex Attributes to Texture (1 or 2 meshes)">\n'
+    '  <Param type="RichEnum" name="AttributeEnum" value="1" description="" tooltip=""'
+    ' enum_cardinality="4" enum_val0="a" enum_val1="b" enum_val2="c" enum_val3="d"/>\n'
+    '  <Param type="RichString" name="textName" value="{}" description="" tooltip=""/>\n'
+    '  <Param type="RichInt" name="textW" value="64" description="" tooltip=""/>\n'
+    '  <Param type="RichInt" name="textH" value="64" description="" tooltip=""/>\n'
+    " </filter>\n"
+)
+
+
+@pytest.mark.parametrize("name", ["../../outside.png", "inside.png"])
+def test_a_texture_stays_in_the_folder_of_the_output(tmp_path, capsys, name):
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    ms = ml.MeshSet()
+    ms.create_cube()
+    ms.save_current_mesh(str(folder / "in.ply"))
+    path = script(folder, TEXTURE.format(name))
+    code = main(["script", str(folder / "in.ply"), str(path), "-o", str(folder / "out.obj")])
+    found = {str(entry.relative_to(tmp_path)) for entry in tmp_path.rglob("*") if entry.is_file()}
+    made = found - {"a/b/in.ply", "a/b/script.mlx"}
+    if name == "inside.png":
+        assert code == 0
+        assert made == {"a/b/out.obj", "a/b/out.obj.mtl", "a/b/inside.png"}
+    else:
+        assert code == 2
+        assert "outside.png' would leave the folder" in capsys.readouterr().err
+        assert not made

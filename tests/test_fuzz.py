@@ -21,10 +21,10 @@ def load():
     return module
 
 
-SLOW = [pytest.param(kind, 2, marks=pytest.mark.slow) for kind in ("faults", "threads")]
+SLOW = [pytest.param(kind, 2, marks=pytest.mark.slow) for kind in ("faults", "threads", "lost")]
 
 
-@pytest.mark.parametrize(("kind", "cases"), [("clouds", 16), ("files", 60), ("steps", 100), *SLOW])
+@pytest.mark.parametrize(("kind", "cases"), [("clouds", 16), ("files", 60), ("steps", 100), ("packed", 4), *SLOW])
 def test_some_cases(kind, cases):
     words = [sys.executable, str(FUZZ), "--cases", str(cases), "--kind", kind]
     done = subprocess.run(words, capture_output=True, text=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 from face_plugin.adapters.pymeshlab import calls
 from face_plugin.adapters.pymeshlab.filters import apply_by_name, apply_step, suggestion
-from face_plugin.adapters.pymeshlab.script import Element, apply_host_step, load_steps, read_steps, steps_of
+from face_plugin.adapters.pymeshlab.script import Element, apply_host_step, check_steps, load_steps, read_steps, steps_of
 from face_plugin.adapters.pymeshlab.table import FILTERS, python_name
 from face_plugin.errors import require
 
@@ -24,7 +24,7 @@ def run_filter_script(ms: Any, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     OSError, ValueError
-        The file cannot be read, or is no filter script.
+        The file cannot be read, is no filter script, or has a step of MeshLab's that writes files of its own.
     PyMeshLabException
         A step failed; the message names its number (from 1) and its filter.
 
@@ -39,7 +39,9 @@ def run_filter_script(ms: Any, path: str | os.PathLike[str]) -> None:
     >>> ms.add_mesh(pymeshlab.Mesh(sphere(300).points))
     >>> run_filter_script(ms, path)
     """
-    _run(ms, read_steps(path), _host("apply_filter_script"))
+    steps = read_steps(path)
+    check_steps(path, steps)
+    _run(ms, steps, _host("apply_filter_script"))
 
 
 def register() -> None:

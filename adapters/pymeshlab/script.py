@@ -11,9 +11,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-__all__ = ["Element", "apply_host_step", "kept_script", "load_steps", "read_steps", "steps_of"]
+__all__ = ["Element", "apply_host_step", "check_steps", "kept_script", "load_steps", "read_steps", "steps_of"]
 
 Element = ElementTree.Element
+WRITERS = {
+    "NXS Build",
+    "NXS Compress",
+    "Export to Sketchfab",
+    "Export active rasters cameras to file",
+    "GPU Filter Example",
+}
+"""MeshLab's filters that write a file of any name, or send the layer to a server."""
 
 
 def read_steps(path: str | os.PathLike[str]) -> list[Element]:
@@ -34,6 +42,22 @@ def read_steps(path: str | os.PathLike[str]) -> list[Element]:
     if root.tag != "FilterScript":
         raise ValueError(f"{path}: not a MeshLab filter script: holds <{root.tag}>")
     return root.findall("filter")
+
+
+def check_steps(path: str | os.PathLike[str], steps: Sequence[Element]) -> None:
+    """Refuse a script of whoever wrote it that writes elsewhere than the one who runs it said.
+
+    Raises
+    ------
+    ValueError
+        A step is one of `WRITERS`.
+    """
+    for number, step in enumerate(steps, 1):
+        if step.get("name") in WRITERS:
+            raise ValueError(
+                f"{path}: step {number} ({step.get('name')}) writes or sends files of its own, which a script may not; "
+                "apply that filter in Python"
+            )
 
 
 def steps_of(ms: Any) -> list[Element]:

@@ -23,7 +23,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 # Share of the cases: a fault takes seconds, a damaged file milliseconds.
-KINDS = {"clouds": 0.47, "files": 0.47, "steps": 0.03, "faults": 0.02, "threads": 0.01}
+KINDS = {"clouds": 0.45, "files": 0.45, "steps": 0.05, "packed": 0.02, "faults": 0.02, "threads": 0.005, "lost": 0.005}
 Found = queue.Queue[tuple[str, int, str]]
 HANG = 60.0
 """Seconds without an answer after which a case counts as hanging."""
@@ -64,7 +64,8 @@ def watched(kind: str, first: int, last: int, step: int, until: float, place: st
                 lines.put("")
 
             threading.Thread(target=read, daemon=True).start()
-            lines.get()
+            if not lines.get():
+                lines.put("")  # it ended before it was ready
             while seed < last:
                 try:
                     line = lines.get(timeout=HANG)

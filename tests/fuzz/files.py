@@ -11,13 +11,9 @@ from test_io_mutations import FILES, mutated
 from face_plugin.io import CLOUD_SUFFIXES, read_cloud, write_cloud
 
 
-def case(seed: int, folder: Path) -> str:
-    rng = np.random.default_rng([seed, 2])
-    name = str(rng.choice(sorted(FILES)))
-    content = FILES[name]
-    content = content() if callable(content) else content
-    path = folder / name
-    path.write_bytes(mutated(content if isinstance(content, bytes) else content.encode(), rng))
+def read_mutated(path: Path, content: bytes, rng: np.random.Generator) -> str:
+    """Change some bytes, read, and write again what is read."""
+    path.write_bytes(mutated(content, rng))
     # NumPy parses headers as Python, and asks in front of everybody what was meant by 0x1if.
     warnings.simplefilter("ignore", SyntaxWarning)
     try:
@@ -28,5 +24,13 @@ def case(seed: int, folder: Path) -> str:
     if path.suffix in CLOUD_SUFFIXES:
         keep = rng.random(len(cloud)) < 0.7
         write_cloud(path, cloud, normals=np.zeros((len(cloud), 3)), keep=keep)
-    assert [entry.name for entry in folder.iterdir()] == [name]
+    assert [entry.name for entry in path.parent.iterdir()] == [path.name]
     return "read"
+
+
+def case(seed: int, folder: Path) -> str:
+    rng = np.random.default_rng([seed, 2])
+    name = str(rng.choice(sorted(FILES)))
+    content = FILES[name]
+    content = content() if callable(content) else content
+    return read_mutated(folder / name, content if isinstance(content, bytes) else content.encode(), rng)

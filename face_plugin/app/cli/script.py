@@ -49,12 +49,16 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
             run_filter_script(ms, args.script)
     except ml.PyMeshLabException as error:
         raise FaceError(f"{args.script}: {error}") from error
+    mesh = ms.current_mesh()
+    for name in mesh.textures():
+        # MeshLab saves a texture where its name leads, seen from the layer's file.
+        if Path(name).name != name or "\\" in name:
+            raise ValueError(f"{args.script} on {args.input}: the texture {name!r} would leave the folder of {output}")
     # MeshLab may write more than one file (an OBJ has its materials beside it): all of them, or none.
     with console.stage("write"), tempfile.TemporaryDirectory(dir=output.resolve().parent) as folder:
         ms.save_current_mesh(str(Path(folder) / output.name))
         for path in Path(folder).iterdir():
             os.replace(path, output.resolve().parent / path.name)
-    mesh = ms.current_mesh()
     summary = {
         "input": args.input,
         "output": output,

@@ -7,7 +7,14 @@ from typing import Any
 
 from face_plugin.adapters.pymeshlab import calls
 from face_plugin.adapters.pymeshlab.filters import apply_by_name, apply_step, suggestion
-from face_plugin.adapters.pymeshlab.script import Element, apply_host_step, check_steps, load_steps, read_steps, steps_of
+from face_plugin.adapters.pymeshlab.script import (
+    Element,
+    apply_host_step,
+    check_steps,
+    load_steps,
+    read_steps,
+    steps_of,
+)
 from face_plugin.adapters.pymeshlab.table import FILTERS, python_name
 from face_plugin.errors import require
 

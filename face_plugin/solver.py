@@ -18,10 +18,12 @@ from face_plugin.params import Params, settled
 from face_plugin.plane import refuse_in_plane
 from face_plugin.reading import Reading
 from face_plugin.result import Result
+from face_plugin.sculpt.file import SculptFile
 from face_plugin.sculpt.sculptable import Sculptable
 from face_plugin.sculpt.sculptor import Sculptor
 from face_plugin.sides.given import checked_trust, given_lines, sides_of_lines
 from face_plugin.sides.sensors import Sensors
+from face_plugin.sides.sights import lit
 from face_plugin.sides.strays import find_strays, without
 from face_plugin.stages import Clock, Progress
 
@@ -48,6 +50,8 @@ class FaCE(Sculptable):
     execution : Execution
     timings : dict of str to float
         Seconds by stage.
+    sensors : Sensors or None
+        Where they stood, in the unit of the input.
     strays : (n,) bool
         Input points that lie too far from everything to take part.
     frame : Frame
@@ -101,11 +105,42 @@ class FaCE(Sculptable):
             self.mesh, self.poisson, self.balls, self.cloud, solved.cage.potential, solved.strength, strength_of
         )
         plane = self.cloud.plane_normal() if self.cloud.flat else None
+        self.sensors = sensors
         local = None if sensors is None else sensors.in_frame(self.frame, self.cloud.rows)
         self._reading = Reading(solved.cage, around, solved.sheets, plane, self.params, solved.strength, clock, local)
 
     def _follow(self) -> None:
-        self._reading = dataclasses.replace(self._reading, params=self.params, strength=self._sculptor.strength)
+        local = None if self.sensors is None else self.sensors.in_frame(self.frame, self.cloud.rows)
+        strength = self._sculptor.strength
+        self._reading = dataclasses.replace(self._reading, params=self.params, strength=strength, sensors=local)
+
+    def seen_by(self, sensors: Sensors | None) -> FaCE:
+        """Return a copy that other sensors saw; nothing is solved again.
+
+        Examples
+        --------
+        >>> from face_plugin.shapes import sphere
+        >>> ball = sphere(500)
+        >>> hollow = FaCE(ball.points).seen_by(Sensors([[0.0, 0.0, 0.0]]))
+        >>> bool(((hollow.normals() * ball.normals).sum(axis=1) < 0).all())
+        True
+        """
+        refuse_in_plane(self.cloud.points, sensors=sensors)
+        twin = self.sculpted(SculptFile())
+        twin.sensors = sensors
+        twin._follow()
+        return twin
+
+    @property
+    def looked_at(self) -> NDArray[np.bool_] | None:
+        """Which input points (n,) a sensor saw; None without sensors."""
+        seen = self._reading.looked_at
+        return None if seen is None else seen[self.cloud.rows] & ~self.strays
+
+    def lit(self, query: ArrayLike) -> NDArray[np.bool_]:
+        """Which positions (k, 3), in the unit of the input, a sensor sees past the points; none without sensors."""
+        local = self.frame.to_unit(cloud.as_points(query, "query", (self.cloud.dimension,)))
+        return lit(self._reading.around, self._reading.sensors, local)
 
     @property
     def vertex_strength(self) -> NDArray[np.float64]:

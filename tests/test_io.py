@@ -264,9 +264,13 @@ def test_las_keeps_its_integers_and_dimensions(tmp_path: Path) -> None:
     las.classification = np.arange(7)
     las.gps_time = np.linspace(1e9, 1e9 + 1, 7)
     las.write(tmp_path / "a.las")
+    # Scanners sign in letters that LAS does not allow.
+    content = (tmp_path / "a.las").read_bytes()
+    (tmp_path / "a.las").write_bytes(content[:58] + b"Ger\xe4t".ljust(32, b"\0") + content[90:])
     cloud = read_cloud(tmp_path / "a.las")
     write_cloud(tmp_path / "b.laz", cloud, normals=NORMALS, extra={"strength": np.arange(7.0)})
     again = laspy.read(tmp_path / "b.laz")
+    assert again.header.generating_software == b"Ger\xe4t"
     np.testing.assert_array_equal(again.X, las.X)
     np.testing.assert_array_equal(again.classification, np.arange(7))
     np.testing.assert_array_equal(again.gps_time, las.gps_time)

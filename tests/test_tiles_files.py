@@ -75,10 +75,15 @@ def test_colours_of_las_become_bytes_in_every_part(factor, ball, tmp_path):
     colours = {name: rng.integers(0, 256, COUNT) * (np.arange(COUNT) > 1200) for name in ("red", "green", "blue")}
     given = {name: (values * factor).astype(np.uint16) for name, values in colours.items()}
     write_cloud(tmp_path / "in.las", CloudFile(ball.points, attributes=given))
+    content = (tmp_path / "in.las").read_bytes()
+    (tmp_path / "in.las").write_bytes(content[:58] + b"Ger\xe4t".ljust(32, b"\0") + content[90:])
     opened = open_source(tmp_path / "in.las")
     # The first part is black: it does not say whether the colours have 8 bits or 16.
     parts = columns_of(opened, {"normals": ball.normals}, [], keep=None, chunk=1000)
     WRITERS[".ply"](tmp_path / "out.ply", COUNT, parts, opened)
+    parts = columns_of(opened, {"normals": ball.normals}, [], keep=None, chunk=1000)
+    WRITERS[".las"](tmp_path / "out.las", COUNT, parts, opened)
+    assert b"Ger\xe4t" in (tmp_path / "out.las").read_bytes()[58:90]
     written = read_cloud(tmp_path / "out.ply").attributes
     for name, values in colours.items():
         assert written[name].dtype == np.uint8

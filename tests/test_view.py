@@ -313,13 +313,13 @@ def test_cutting_it_open_shows_a_charge_inside(hand, session, tmp_path):
     closed = hand.picture(tmp_path / "closed.png")
     hand.press("cut open", across=0.05)
     opened = hand.picture(tmp_path / "opened.png")
-    assert hand.viewer.open
+    assert hand.viewer.picture.open
     assert polyscope.get_surface_mesh("field").is_enabled()
     assert yellow(opened) > yellow(closed) + 30
     hand.press("cut open", across=0.05)
-    assert not hand.viewer.open
+    assert not hand.viewer.picture.open
     viewer = Viewer(session, headless=True, size=SIZE, cut="x")
-    assert (viewer.open, session.plane.axis) == (True, 0)
+    assert (viewer.picture.open, session.plane.axis) == (True, 0)
 
 
 def test_carving_by_the_mouse(hand, tmp_path):
@@ -403,6 +403,62 @@ def test_shielding_on_the_field(hand, tmp_path):
     assert green(hand.picture(tmp_path / "shield.png")) > 100
 
 
+def test_a_sensor_by_the_mouse(hand, session, tmp_path):
+    """In the middle of the mug, on the field: what it sees is told, and the normals face it."""
+    outward = session.face.normals()
+    session.plane = Plane(1, 0.5)
+    hand.viewer.picture.open = True
+    hand.frames(2)
+    look((0.0, 6.0, 1.1), (0.0, 0.0, 1.1))
+    before = hand.picture(tmp_path / "before.png")
+    hand.press("sensor")
+    hand.click(SIZE[0] / 2, SIZE[1] / 2 + 60)  # below the panel
+    assert session.face.edits == ()
+    (place,) = session.viewpoints
+    np.testing.assert_allclose(place, [0.0, 0.0, 0.7], atol=0.1)
+    assert hand.viewer.message == "1 sensors"
+    assert polyscope.get_point_cloud("sensors").n_points() == 1
+    seen = session.lit()
+    wall = np.hypot(*session.points[:, :2].T)
+    inner = (np.abs(session.points[:, 2] - 0.7) < 0.5) & (wall < np.quantile(wall, 0.4))
+    assert seen[inner].mean() > 0.9
+    assert seen[session.points[:, 2] < -0.05].mean() < 0.2
+    # The middle of the plane is seen, what lies beyond the wall is not.
+    lit = session.lit_places(np.array([[0.1, 0.0, 0.6], [2.0, 0.0, 0.6]]))
+    assert lit.tolist() == [True, False]
+    towards = place - session.points[seen]
+    assert ((session.face.normals()[seen] * towards).sum(axis=1) > 0).mean() > 0.95
+    assert tuple(name for name, _ in hand.viewer.picture.legend if name.startswith("se")) == ("seen", "sensor")
+    assert not np.array_equal(hand.picture(tmp_path / "after.png"), before)
+    hand.press("save viewpoints")
+    np.testing.assert_allclose(read_cloud(hand.viewer.files["viewpoints"]).points, [place])
+    hand.press("undo")
+    assert len(session.viewpoints) == 0
+    assert session.lit() is None
+    np.testing.assert_array_equal(session.face.normals(), outward)
+    hand.press("save viewpoints")
+    assert hand.viewer.message.startswith("there are no sensors")
+    hand.press("redo")
+    hand.press("clear")
+    assert len(session.viewpoints) == 0
+
+
+def test_the_filter_is_slid_across_the_points(hand, session):
+    session.alpha = 0.3
+    hand.frames(3)
+    inside = session.interior()
+    assert inside.any()
+    counts = []
+    for fraction in (0.0, 0.5, 1.0):
+        hand.viewer.picture.filtered = fraction
+        hand.frames(1)
+        counts.append(polyscope.get_point_cloud("points").n_points())
+    assert counts[0] == 1500
+    assert counts[0] > counts[1] > counts[2]
+    assert counts[2] <= 1500 - inside.sum() + 2  # one stands at the very end
+    hand.viewer.picture.filtered = 0.0
+
+
 def test_a_refusal_is_said_in_the_panel(hand):
     session = hand.viewer.session
     session.mode = "carve"
@@ -470,6 +526,7 @@ def test_a_picture_from_the_command_line(tmp_path, capsys):
         (["--screenshot", "shot.gif"], "allowed are .png, .jpg"),
         (["--save-mesh", "mesh.xyz"], "allowed are .ply"),
         (["--save-sculpt", "edits.ply"], "allowed are .json"),
+        (["--save-viewpoints", "views.gif"], "allowed are .ply"),
     ],
 )
 def test_bad_names_are_said_at_once(tmp_path, capsys, words, message):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -78,7 +79,20 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
     for name, values in new.items():
         if name[:32] in present:
             las[name[:32]] = colour_16_bit(values) if name in COLOUR else values
-    las.write(str(path))
+    with las_writer(laspy, path, las.header) as out:
+        out.write_points(las.points)
+        if las.evlrs:
+            out.write_evlrs(las.evlrs)
+
+
+@contextmanager
+def las_writer(laspy: ModuleType, path: Path, header: Any) -> Iterator[Any]:
+    """Open a LAS or LAZ file to write points into."""
+    # Sound files hold names of software in letters that LAS does not allow: the points are what counts.
+    options = {"do_compress": path.suffix.lower() == ".laz", "encoding_errors": "replace", "closefd": False}
+    # The stream is ours: closing it says what a full disk is, which the compressor does not.
+    with path.open("wb+") as stream, laspy.open(stream, mode="w", header=header, **options) as writer:
+        yield writer
 
 
 def _has_wide_colours(attributes: Mapping[str, Array]) -> bool:

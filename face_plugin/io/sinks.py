@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from face_plugin.errors import require
 from face_plugin.io.disk import allocated
-from face_plugin.io.las import LAS_NORMAL, colour_16_bit, new_las
+from face_plugin.io.las import LAS_NORMAL, colour_16_bit, las_writer, new_las
 from face_plugin.io.names import COLOUR, NORMAL, POINT
 from face_plugin.io.plydata import PlyData
 from face_plugin.io.plywrite import binary_rows, element
@@ -78,21 +79,17 @@ def _las(path: Path, count: int, parts: Iterator[Columns], source: Source) -> No
     laspy: Any = require("laspy", extra="las")
     header: Any = None
     writer: Any = None
-    try:
+    with ExitStack() as stack:
         for part in parts:
             named = {_LAS_NAMES.get(name, name[:32]): values for name, values in part.items()}
             if writer is None:
                 header = _las_header(laspy, named, source)
-                compress = path.suffix.lower() == ".laz"
-                writer = laspy.open(str(path), mode="w", header=header, do_compress=compress)
+                writer = stack.enter_context(las_writer(laspy, path, header))
             records = laspy.ScaleAwarePointRecord.zeros(len(named["x"]), header=header)
             for name, values in named.items():
                 if name in POINT or name in set(header.point_format.dimension_names):
                     records[name] = colour_16_bit(values) if name in COLOUR else values
             writer.write_points(records)
-    finally:
-        if writer is not None:
-            writer.close()
 
 
 def _las_header(laspy: Any, part: Columns, source: Source) -> Any:

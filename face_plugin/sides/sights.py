@@ -6,6 +6,8 @@ another point, nearer to the sensor, within about the distance to that one's nei
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.sensors import Sensors
 from face_plugin.threads import KDTree
 
-__all__ = ["sights", "visible"]
+__all__ = ["lit", "sights", "visible"]
 
 # A point blocks what is behind it within this share of its spacing: the points of an even sheet cover it.
 COVER = 0.7
@@ -58,11 +60,56 @@ def visible(
     >>> bool(seen[ball[:, 2] > 0.3].all()), bool(seen[ball[:, 2] < -0.3].any())
     (True, False)
     """
-    offset = points - viewpoint
-    distance = np.linalg.norm(offset, axis=1)
-    seen = distance > 0
-    distance = np.maximum(distance, np.finfo(float).tiny)
-    direction = offset / distance[:, None]
+    seen = (points != viewpoint).any(axis=1)
+    for blocker, gap in _in_the_way(points, points, spacing, viewpoint):
+        hidden = gap > BEHIND * np.maximum(spacing[:, None], spacing[blocker])
+        if hidden.any():
+            some = np.flatnonzero(hidden.any(axis=1))
+            off = np.abs(np.einsum("nkd,nd->nk", points[blocker[some]] - points[some, None], lines[some]))
+            hidden[some] &= off > IN_PLANE * np.maximum(spacing[some, None], spacing[blocker[some]])
+        seen &= ~hidden.any(axis=1)
+    return np.asarray(seen)
+
+
+def lit(around: Neighbourhood, sensors: Sensors | None, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which places (k, 3) a sensor sees past the points.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = Neighbourhood(sphere(2000).points)
+    >>> lit(ball, Sensors([0.0, 0.0, 9.0]), np.array([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]])).tolist()
+    [True, False]
+    """
+    seen = np.zeros(len(places), dtype=np.bool_)
+    if sensors is None:
+        return seen
+    for view in _spread(_views(around.points, sensors)):
+        free = np.ones(len(places), dtype=np.bool_)
+        for blocker, gap in _in_the_way(places, around.points, around.spacing, view):
+            free &= ~(gap > BEHIND * around.spacing[blocker]).any(axis=1)
+        seen |= free
+    return seen
+
+
+def _in_the_way(
+    places: NDArray[np.float64],
+    points: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    viewpoint: NDArray[np.float64],
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float64]]]:
+    """Yield points (k, j) in the direction of places (k, 3), and how much nearer (k, j) they are to the viewpoint.
+
+    They are -inf nearer where they do not cover the place.
+    """
+
+    def looked_at(these: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        offset = these - viewpoint
+        distance = np.maximum(np.linalg.norm(offset, axis=1), np.finfo(float).tiny)
+        return distance, offset / distance[:, None]
+
+    distance, direction = looked_at(points)
+    away, ahead = looked_at(places)
     size = COVER * spacing / distance
     # A near point is apart from its neighbours by more, as seen from here, than the far ones behind it: each octave of
     # sizes is searched by itself, or those behind would crowd it out.
@@ -71,18 +118,10 @@ def visible(
     for this in np.unique(octave):
         rows = np.flatnonzero(octave == this)
         count = min(LOOKED_AT, len(rows))
-        apart, near = KDTree(direction[rows]).query(direction, k=count)
-        blocker = rows[near.reshape(len(points), count)]
-        gap = distance[:, None] - distance[blocker]
-        hidden = (apart.reshape(len(points), count) < size[blocker]) & (
-            gap > BEHIND * np.maximum(spacing[:, None], spacing[blocker])
-        )
-        if hidden.any():
-            some = np.flatnonzero(hidden.any(axis=1))
-            off = np.abs(np.einsum("nkd,nd->nk", points[blocker[some]] - points[some, None], lines[some]))
-            hidden[some] &= off > IN_PLANE * np.maximum(spacing[some, None], spacing[blocker[some]])
-        seen &= ~hidden.any(axis=1)
-    return np.asarray(seen)
+        apart, near = KDTree(direction[rows]).query(ahead, k=count)
+        blocker = rows[near.reshape(len(places), count)]
+        covered = apart.reshape(len(places), count) < size[blocker]
+        yield blocker, np.where(covered, away[:, None] - distance[blocker], -np.inf)
 
 
 def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,20 +131,26 @@ def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) 
     """
     points = around.points
     total = np.zeros_like(points)
-    views = np.empty((0, 3)) if sensors.viewpoints is None else np.asarray(sensors.viewpoints)
+    views = _views(points, sensors)
     told = np.zeros(len(points), dtype=np.bool_)
     if sensors.seen_from is not None:
         rows = np.asarray(sensors.seen_from)
         told = rows >= 0
         total[told] = _toward(points[told], views[rows[told]])
-    if sensors.up is not None:
-        up = np.asarray(sensors.up) / np.linalg.norm(np.asarray(sensors.up))
-        views = np.concatenate([views, (points.mean(axis=0) + FAR_AWAY * up)[None]])
     if not told.all():
         for view in _spread(views):
             seen = visible(points, around.spacing, view, lines) & ~told
             total[seen] += _toward(points[seen], view)
     return total
+
+
+def _views(points: NDArray[np.float64], sensors: Sensors) -> NDArray[np.float64]:
+    """Viewpoints (k, 3); the last is far away where all was seen from one direction."""
+    views = np.empty((0, 3)) if sensors.viewpoints is None else np.asarray(sensors.viewpoints)
+    if sensors.up is None:
+        return views
+    up = np.asarray(sensors.up) / np.linalg.norm(np.asarray(sensors.up))
+    return np.concatenate([views, (points.mean(axis=0) + FAR_AWAY * up)[None]])
 
 
 def _toward(points: NDArray[np.float64], view: NDArray[np.float64]) -> NDArray[np.float64]:

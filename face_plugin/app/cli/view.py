@@ -8,7 +8,8 @@ from typing import Any
 
 from face_plugin.app.cli.console import Console
 from face_plugin.app.cli.options import add_command, add_method, add_sculpt, execution_of, params_of
-from face_plugin.io import MESH_SUFFIXES, check_output, read_cloud
+from face_plugin.app.cli.sensors import add_sensors, sensors_in
+from face_plugin.io import CLOUD_SUFFIXES, MESH_SUFFIXES, check_output, read_cloud
 
 __all__ = ["register"]
 
@@ -31,11 +32,18 @@ def register(commands: Any) -> None:
         type=Path,
         help=f"where it saves the surface ({', '.join(MESH_SUFFIXES)}) [default: IN_mesh.ply]",
     )
+    parser.add_argument(
+        "--save-viewpoints",
+        metavar="OUT",
+        type=Path,
+        help="where it saves the sensors placed by clicks, for --viewpoints [default: IN_viewpoints.csv]",
+    )
     parser.add_argument("--screenshot", metavar="PNG", type=Path, help="write a picture instead of opening a window")
     parser.add_argument("--up", choices=("x", "y", "z"), default="z", help="the axis that points upward [default: z]")
     parser.add_argument(
         "--cut", choices=("x", "y", "z"), help="cut the object open across this axis, and show the field there"
     )
+    add_sensors(parser, up="--seen-up")
     add_method(parser)
 
 
@@ -44,9 +52,13 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     from face_plugin.app.viewer.session import Session
     from face_plugin.app.viewer.window import Viewer
     from face_plugin.errors import require
+    from face_plugin.sides.sensors import sensors_of
 
     sculpt_file = args.save_sculpt or args.input.with_name(f"{args.input.stem}_sculpt.json")
     mesh_file = args.save_mesh or args.input.with_name(f"{args.input.stem}_mesh.ply")
+    viewpoints_file = args.save_viewpoints or args.input.with_name(f"{args.input.stem}_viewpoints.csv")
+    if args.save_viewpoints is not None:
+        check_output(viewpoints_file, CLOUD_SUFFIXES)
     if args.save_sculpt is not None:
         check_output(sculpt_file, (".json",))
     if args.save_mesh is not None:
@@ -58,11 +70,15 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
     params, execution = params_of(args), execution_of(args)
     with console.stage("read"):
         cloud = read_cloud(args.input)
-    session = Session(cloud.points, params, execution=execution, sculpt=args.sculpt, progress=console.progress)
+    sensors = sensors_of(**sensors_in(args, console, cloud))
+    session = Session(
+        cloud.points, params, execution=execution, sculpt=args.sculpt, sensors=sensors, progress=console.progress
+    )
     viewer = Viewer(
         session,
         sculpt_file=sculpt_file,
         mesh_file=mesh_file,
+        viewpoints_file=viewpoints_file,
         headless=args.screenshot is not None,
         up=args.up,
         cut=args.cut,
@@ -79,6 +95,7 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
         "alpha": session.alpha,
         "interior": int(session.interior().sum()),
         "charges": sum(edit.kind == "charge" for edit in edits),
+        "sensors": len(session.viewpoints),
         "cage_points": sum(edit.kind == "cage" for edit in edits),
         "params": params.to_dict(),
         "execution": execution.to_dict(),

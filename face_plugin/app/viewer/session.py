@@ -13,17 +13,18 @@ from face_plugin.cloud import as_points
 from face_plugin.estimate import solve_whole
 from face_plugin.execution import Execution
 from face_plugin.faraday.isosurface import fill_balls, isosurface
-from face_plugin.io import MESH_SUFFIXES, check_output, write_mesh
+from face_plugin.io import CLOUD_SUFFIXES, MESH_SUFFIXES, CloudFile, check_output, write_cloud, write_mesh
 from face_plugin.params import Params
 from face_plugin.sculpt import Edit, SculptFile
+from face_plugin.sides.sensors import Sensors
 from face_plugin.solver import FaCE
 from face_plugin.stages import Progress
 from face_plugin.surface import poisson_reconstruction
 
 __all__ = ["MODES", "Mode", "Plane", "Session"]
 
-Mode = Literal["look", "carve", "shield"]
-MODES: tuple[Mode, ...] = ("look", "carve", "shield")
+Mode = Literal["look", "carve", "shield", "sensor"]
+MODES: tuple[Mode, ...] = ("look", "carve", "shield", "sensor")
 
 # States kept for undo; each holds a field.
 LONGEST_HISTORY = 50
@@ -55,13 +56,15 @@ class Session:
     execution : Execution, optional
     sculpt : SculptFile or path, optional
         Edits to start with.
+    sensors : Sensors, optional
+        Where sensors stood, as far as it is known.
     progress : callable, optional
         ``progress(stage, fraction)`` while the cage is solved.
 
     Attributes
     ----------
     points : (n, 3) float
-    mode : {"look", "carve", "shield"}
+    mode : {"look", "carve", "shield", "sensor"}
         What a click does.
     automatic : bool
         Whether points are interior as ``alpha="auto"`` has it, and not by `alpha` alone. Setting `alpha` ends it.
@@ -86,13 +89,16 @@ class Session:
         *,
         execution: Execution | None = None,
         sculpt: SculptFile | str | os.PathLike[str] | None = None,
+        sensors: Sensors | None = None,
         progress: Progress | None = None,
     ) -> None:
         # A bad file is said before the cage is solved.
         first = SculptFile() if sculpt is None else sculpt
         first = first if isinstance(first, SculptFile) else SculptFile.load(first)
         self.points = as_points(points)
-        solved = solve_whole(self.points, params, purpose="sculpting", execution=execution, progress=progress)
+        solved = solve_whole(
+            self.points, params, purpose="sculpting", sensors=sensors, execution=execution, progress=progress
+        )
         # Refining normals takes longer than an edit: they are refined when the surface is made.
         self._angles = solved.params.angles
         self._states = [solved.with_angles("field").sculpted(first)]
@@ -131,7 +137,7 @@ class Session:
         Returns
         -------
         tuple of Edit
-            What was made; nothing in the mode "look".
+            What was made; nothing in the modes "look" and "sensor". A sensor stands where the click was.
 
         Raises
         ------
@@ -141,6 +147,10 @@ class Session:
         if self.mode == "look":
             return ()
         place = np.asarray(position, dtype=np.float64)
+        if self.mode == "sensor":
+            up = None if self.face.sensors is None else self.face.sensors.up
+            self._push(self.face.seen_by(Sensors(np.concatenate([self.viewpoints, place[None]]), up=up)))
+            return ()
         ways = [place]
         if normal is not None:
             spacing = 2 * float(np.median(self.face.balls.radii)) * self.face.frame.scale
@@ -162,9 +172,9 @@ class Session:
         raise refusals[0]
 
     def clear(self) -> None:
-        """Take all edits back; this can be undone too."""
-        if self.face.edits:
-            twin = self.face.sculpted(SculptFile())
+        """Take all edits and sensors back; this can be undone too."""
+        if self.face.edits or self.face.sensors is not None:
+            twin = self.face.seen_by(None)
             twin.clear_edits()
             self._push(twin)
 
@@ -179,6 +189,20 @@ class Session:
     def _push(self, state: FaCE) -> None:
         self._states = [*self._states[: self._now + 1], state][-LONGEST_HISTORY:]
         self._now = len(self._states) - 1
+
+    @property
+    def viewpoints(self) -> NDArray[np.float64]:
+        """Where sensors stand (k, 3), in the unit of the input."""
+        sensors = self.face.sensors
+        return np.empty((0, 3)) if sensors is None or sensors.viewpoints is None else np.asarray(sensors.viewpoints)
+
+    def lit(self) -> NDArray[np.bool_] | None:
+        """Which points (n,) a sensor sees; None without sensors."""
+        return self.face.looked_at
+
+    def lit_places(self, places: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+        """Which places (k, 3), in the unit of the input, a sensor sees past the points; None without sensors."""
+        return None if self.face.sensors is None else self.face.lit(places)
 
     def interior(self) -> NDArray[np.bool_]:
         """Which points (n,) lie inside the object, by the present field."""
@@ -226,6 +250,13 @@ class Session:
     def save_sculpt(self, path: str | os.PathLike[str]) -> None:
         """Write the edits as JSON, for `face mesh --sculpt`."""
         SculptFile.of(self.face.edits).save(check_output(path, (".json",)))
+
+    def save_viewpoints(self, path: str | os.PathLike[str]) -> None:
+        """Write where sensors stand, for ``--viewpoints`` of any command."""
+        output = check_output(path, CLOUD_SUFFIXES)
+        if not len(self.viewpoints):
+            raise ValueError("there are no sensors: choose the mode sensor, and click where they stood")
+        write_cloud(output, CloudFile(self.viewpoints))
 
     def save_mesh(self, path: str | os.PathLike[str]) -> None:
         """Write `surface` to a .ply, .obj, .stl or .off file."""

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from face_plugin import shapes
-from face_plugin.sides.alpha_shape import outside_alpha_shape
+from face_plugin.sides.alpha_shape import AlphaShapes
 
 
 def sphere_around(corners: np.ndarray) -> tuple[np.ndarray, float]:
@@ -51,7 +51,7 @@ def test_the_flood_is_that_of_the_definition(radius):
     points = np.random.default_rng(0).uniform(size=(80, 3))
     mesh = Delaunay(points)
     expected = slowly(points, mesh, radius)
-    assert np.array_equal(outside_alpha_shape(points, mesh.simplices, np.full(80, radius)), expected)
+    assert np.array_equal(AlphaShapes(points, mesh.simplices).outside(np.full(80, radius)), expected)
     # At most radii a part is reached.
     assert expected.any()
 
@@ -63,4 +63,4 @@ def test_a_ball_gets_into_a_hollow_through_a_hole_that_is_wider(radius, inside):
     points = points[points[:, 2] < 0.8]
     mesh = Delaunay(points)
     middle = int(mesh.find_simplex(np.array([[0.01, 0.02, -0.03]]))[0])
-    assert outside_alpha_shape(points, mesh.simplices, np.full(len(points), radius))[middle] == inside
+    assert AlphaShapes(points, mesh.simplices).outside(np.full(len(points), radius))[middle] == inside

@@ -7,54 +7,65 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-__all__ = ["outside_alpha_shape"]
+__all__ = ["AlphaShapes"]
 
 
-def outside_alpha_shape(
-    points: NDArray[np.float64], corners: NDArray[np.int32], radius: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Tell which Delaunay tetrahedra (t,) a ball gets to from outside (Edelsbrunner and Mücke 1994).
+class AlphaShapes:
+    """Alpha shapes of points, for balls of any radius (Edelsbrunner and Mücke 1994).
 
-    It passes a facet if the circle around that is wider than the ball; or, where a corner beside it lies in the least
-    ball around it, if the spheres around both of its tetrahedra are.
+    A ball passes a facet if the circle around that is wider than the ball; or, where a corner beside it lies in the
+    least ball around it, if the spheres around both of its tetrahedra are.
 
     Parameters
     ----------
     points : (n, 3) float64
     corners : (t, 4) int
         Of the Delaunay tetrahedra of the points.
-    radius : (n,) float64
-        Of the ball, at each point; its mean over a facet's corners counts.
 
     Examples
     --------
     >>> from scipy.spatial import Delaunay
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(300).points
-    >>> corners = Delaunay(ball).simplices
-    >>> [float(outside_alpha_shape(ball, corners, np.full(300, radius)).mean()) for radius in (0.01, 0.5)]
+    >>> shapes = AlphaShapes(ball, Delaunay(ball).simplices)
+    >>> [float(shapes.outside(np.full(300, radius)).mean()) for radius in (0.01, 0.5)]
     [1.0, 0.0]
     """
-    outside, size = len(corners), len(points)
-    facet = np.sort(np.concatenate([np.delete(corners, k, axis=1) for k in range(4)]).astype(np.int64), axis=1)
-    of, apex = np.tile(np.arange(outside), 4), corners.T.ravel()
-    # Equal facets stand side by side then.
-    order = np.lexsort((facet[:, 2], facet[:, 0] * size + facet[:, 1]))
-    facet, of, apex = facet[order], of[order], apex[order]
-    same = np.append((facet[1:] == facet[:-1]).all(axis=1), False)
-    first = np.flatnonzero(~np.roll(same, 1))
-    beyond = np.where(same, np.roll(of, -1), outside)[first]
-    # A facet of the hull has one tetrahedron, whose corner stands for both.
-    apex = np.stack([apex, np.where(same, np.roll(apex, -1), apex)])[:, first]
-    facet, of = facet[first], of[first]
-    width = radius[facet].mean(axis=1)
-    centre, circle = _circles(*(points[facet[:, k]] for k in range(3)))
-    held = (np.linalg.norm(points[apex] - centre, axis=2) < circle).any(axis=0)
-    sphere = np.append(_spheres(*(points[corners[:, k]] for k in range(4))), np.inf)
-    through = np.where(held, np.minimum(sphere[of], sphere[beyond]), circle) > width
-    link = coo_matrix((np.ones(through.sum()), (of[through], beyond[through])), shape=(outside + 1, outside + 1))
-    label = connected_components(link, directed=False)[1]
-    return np.asarray(label[:outside] == label[outside])
+
+    def __init__(self, points: NDArray[np.float64], corners: NDArray[np.int32]) -> None:
+        outside, size = len(corners), len(points)
+        facet = np.sort(np.concatenate([np.delete(corners, k, axis=1) for k in range(4)]).astype(np.int64), axis=1)
+        of, apex = np.tile(np.arange(outside), 4), corners.T.ravel()
+        # Equal facets stand side by side then.
+        order = np.lexsort((facet[:, 2], facet[:, 0] * size + facet[:, 1]))
+        facet, of, apex = facet[order], of[order], apex[order]
+        same = np.append((facet[1:] == facet[:-1]).all(axis=1), False)
+        first = np.flatnonzero(~np.roll(same, 1))
+        beyond = np.where(same, np.roll(of, -1), outside)[first]
+        # A facet of the hull has one tetrahedron, whose corner stands for both.
+        apex = np.stack([apex, np.where(same, np.roll(apex, -1), apex)])[:, first]
+        facet, of = facet[first], of[first]
+        # The sphere around a flat tetrahedron is as wide as numbers go.
+        with np.errstate(over="ignore"):
+            centre, circle = _circles(*(points[facet[:, k]] for k in range(3)))
+            held = (np.linalg.norm(points[apex] - centre, axis=2) < circle).any(axis=0)
+            sphere = np.append(_spheres(*(points[corners[:, k]] for k in range(4))), np.inf)
+        self._facet, self._of, self._beyond, self._count = facet, of, beyond, outside
+        self._passes = np.where(held, np.minimum(sphere[of], sphere[beyond]), circle)
+
+    def outside(self, radius: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which tetrahedra (t,) a ball gets to from afar.
+
+        Parameters
+        ----------
+        radius : (n,) float64
+            Of the ball, at each point; its mean over a facet's corners counts.
+        """
+        through = self._passes > radius[self._facet].mean(axis=1)
+        size = self._count + 1
+        link = coo_matrix((np.ones(through.sum()), (self._of[through], self._beyond[through])), shape=(size, size))
+        label = connected_components(link, directed=False)[1]
+        return np.asarray(label[:-1] == label[-1])
 
 
 def _circles(

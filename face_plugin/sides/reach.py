@@ -11,20 +11,24 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import Delaunay
 
 from face_plugin.faraday.meshers.delaunay import tetrahedralize
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.alpha_shape import outside_alpha_shape
+from face_plugin.sides.alpha_shape import AlphaShapes
 from face_plugin.sides.clusters import cluster_signs, where_better
 from face_plugin.sides.graph import connected_parts, couplings, neighbours_around
 from face_plugin.sides.patches import SMALLEST, winding_number
 
-__all__ = ["out_of_reach", "reach"]
+__all__ = ["out_of_reach", "reach", "reached_places"]
 
 # Radius of the ball that free space spreads as, in spacings: the least, for even samplings, and so much more a unit of
 # the coefficient of variation of the nearest distances, which is 0.05 to 0.1 on even samplings and 0.52 at random.
 # There, the circle around one facet in ten thousand is wider.
 WIDE, WIDER = 1.25, 1.5
+# Balls that are tried, in that radius: at random the widest gap of a million points is half as wide again as that of ten
+# thousand.
+WIDENED = (1.0, 1.15, 1.3, 1.5)
 # Points are moved by at most so many spacings before they are meshed: rows are the worst case of meshers.
 OUT_OF_ROWS = 1e-3
 # A point is inside out where the winding number of the others is farther than this from the surface's 1/2.
@@ -104,19 +108,68 @@ def reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.flo
     >>> bool(reach(around, ball.normals).mean() > 0.9), bool(reach(around, -ball.normals).mean() < -0.9)
     (True, True)
     """
-    points, nearest = around.points, around.distance[:, 1]
-    wide = (WIDE + WIDER * float(nearest.std() / nearest.mean())) * around.spacing
-    moved = np.random.default_rng(0).uniform(-OUT_OF_ROWS, OUT_OF_ROWS, points.shape) * around.spacing[:, None]
-    corners = tetrahedralize(points + moved)
-    reached = outside_alpha_shape(points, corners, wide)
+    return _reached(around, normals, tetrahedralize(_out_of_rows(around)))[1]
+
+
+def reached_places(
+    around: Neighbourhood, normals: NDArray[np.float64], places: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which places (k, 3) free space gets to from outside, past points with these normals (n, 3).
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import cup
+    >>> mug = cup(3000)
+    >>> places = np.array([[0.0, 0.0, 0.7], [0.0, 0.0, 0.95], [0.55, 0.0, 0.3]])
+    >>> reached_places(Neighbourhood(mug.points), mug.normals, places).tolist()
+    [True, True, False]
+    """
+    mesh = Delaunay(_out_of_rows(around))
+    reached, _ = _reached(around, normals, mesh.simplices)
+    at = mesh.find_simplex(places)
+    return np.asarray((at < 0) | reached[at])
+
+
+def _reached(
+    around: Neighbourhood, normals: NDArray[np.float64], corners: NDArray[np.int32]
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Tetrahedra (t,) that are reached, and what `reach` returns.
+
+    A single gap of the sampling lets a ball in, and then all is reached; a ball that is too wide gets into no cavity.
+    That ball is taken that leaves most points with free space on one side alone.
+    """
+    nearest = around.distance[:, 1]
+    ball = (WIDE + WIDER * float(nearest.std() / nearest.mean())) * around.spacing
+    shapes, in_front = AlphaShapes(around.points, corners), _in_front(around.points, normals, corners)
+    tried = []
+    for widening in WIDENED:
+        reached = shapes.outside(widening * ball)
+        tried.append((reached, _evidence(len(around), corners, in_front, reached)))
+    return max(tried, key=lambda found: float(np.abs(found[1]).mean()))
+
+
+def _in_front(
+    points: NDArray[np.float64], normals: NDArray[np.float64], corners: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """Whether tetrahedra lie in front of each of their corners (t, 4)."""
     centre = points[corners].mean(axis=1)
-    # Behind and in front of each point: tetrahedra, and those of them that are reached.
-    count, free = np.zeros((2, len(points))), np.zeros((2, len(points)))
-    for corner in corners.T:
-        front = np.einsum("nd,nd->n", centre - points[corner], normals[corner]) > 0
-        for side, there in enumerate((~front, front)):
-            count[side] += np.bincount(corner[there], minlength=len(points))
-            free[side] += np.bincount(corner[there & reached], minlength=len(points))
-    # Beyond the hull there are none.
-    share = np.where(count > 0, free / np.maximum(count, 1), 1.0)
-    return np.asarray(share[1] - share[0])
+    sides = [np.einsum("nd,nd->n", centre - points[corner], normals[corner]) > 0 for corner in corners.T]
+    return np.stack(sides, axis=1)
+
+
+def _evidence(
+    size: int, corners: NDArray[np.int32], in_front: NDArray[np.bool_], reached: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Share (n,) of the tetrahedra in front of each point that are reached, less that of those behind it."""
+    share = []
+    for there in (in_front, ~in_front):
+        count = np.bincount(corners[there], minlength=size)
+        free = np.bincount(corners[there & reached[:, None]], minlength=size)
+        # Beyond the hull there are none.
+        share.append(np.where(count > 0, free / np.maximum(count, 1), 1.0))
+    return np.asarray(share[0] - share[1])
+
+
+def _out_of_rows(around: Neighbourhood) -> NDArray[np.float64]:
+    moved = np.random.default_rng(0).uniform(-OUT_OF_ROWS, OUT_OF_ROWS, around.points.shape)
+    return np.asarray(around.points + moved * around.spacing[:, None])

@@ -116,13 +116,17 @@ def run(args: argparse.Namespace, console: Console) -> tuple[dict[str, Any], str
             summary["dropped"] = int(result.interior.sum())
     elif args.interior and result.interior is not None:
         meshes = []
-        for keep in (slice(None), result.kept):
+        for keep in (~result.strays, result.kept):
             with console.stage("surface"):
                 given = points[keep], result.normals[keep]
                 meshes.append(poisson_reconstruction(*given, open_at=result.open[keep], **options)[:2])
         with console.stage("draw"):
-            figure = plot.plot_interior(points, result.interior, *meshes, **looks)
+            reached = plot.space_reached(points[~result.strays], result.normals[~result.strays])
+            figure = plot.plot_interior(
+                points, result.interior, *meshes, strays=result.strays, reached=reached, **looks
+            )
         summary["dropped"] = int(result.interior.sum())
+        summary["strays"] = int(result.strays.sum())
     else:
         with console.stage("draw"):
             field = plot.field_within(face)

@@ -2,7 +2,7 @@
 
 from face_plugin.app.plot.curves import plot_curves
 from face_plugin.app.plot.figures import PLOT_SUFFIXES, save_figure
-from face_plugin.app.plot.interior import plot_interior
+from face_plugin.app.plot.interior import plot_interior, space_reached
 from face_plugin.app.plot.render import Camera, render_mesh, render_points
 from face_plugin.app.plot.result import field_within, plot_result
 
@@ -16,4 +16,5 @@ __all__ = [
     "render_mesh",
     "render_points",
     "save_figure",
+    "space_reached",
 ]

@@ -52,6 +52,7 @@ class Matplotlib:
         self.Figure = require("matplotlib.figure", extra="plot").Figure
         self.Normalize = require("matplotlib.colors", extra="plot").Normalize
         self.ScalarMappable = require("matplotlib.cm", extra="plot").ScalarMappable
+        self.Rectangle = require("matplotlib.patches", extra="plot").Rectangle
         self.LineCollection = require("matplotlib.collections", extra="plot").LineCollection
 
 

@@ -26,8 +26,8 @@ __all__ = ["out_of_reach", "reach", "reached_places"]
 # the coefficient of variation of the nearest distances, which is 0.05 to 0.1 on even samplings and 0.52 at random.
 # There, the circle around one facet in ten thousand is wider.
 WIDE, WIDER = 1.25, 1.5
-# Balls that are tried, in that radius: at random the widest gap of a million points is half as wide again as that of ten
-# thousand.
+# Balls that are tried, in that radius: at random the widest gap of a million points is half as wide again as that of
+# ten thousand.
 WIDENED = (1.0, 1.15, 1.3, 1.5)
 # Points are moved by at most so many spacings before they are meshed: rows are the worst case of meshers.
 OUT_OF_ROWS = 1e-3

@@ -16,6 +16,9 @@ log = logging.getLogger(__name__)
 
 # Times that a tile may be lost with its worker, or fail, before the run fails.
 RETRIES = 5
+ADVICE = "probably for lack of memory: lower Execution.tile_points, or give the workers more memory"
+# Seconds without a tile done after which it is asked whether there are workers at all.
+PATIENCE = 5.0
 # Tiles handed to the scheduler at a time, for each thread of the workers: all would be a burden to it.
 TILES_A_THREAD = 4
 
@@ -41,11 +44,14 @@ class Dask:
         self._memory = memory
         self._stack = ExitStack()
         self._client: Any = None
+        self._cluster: Any = None
 
     def __enter__(self) -> Dask:
         given = self._given
         if given is None:
-            given = self._current() or self._stack.enter_context(self._local())
+            given = self._current()
+        if given is None:
+            given = self._cluster = self._stack.enter_context(self._local())
         if isinstance(given, str) or not hasattr(given, "submit"):
             given = self._stack.enter_context(self._distributed.Client(given, set_as_default=False))
         self._client = given
@@ -62,13 +68,16 @@ class Dask:
 
     def _local(self) -> Any:
         # A thread a worker: a tile takes a core for itself.
-        return self._distributed.LocalCluster(
-            n_workers=self._workers,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=self._memory,
-            dashboard_address=None,
-        )
+        try:
+            return self._distributed.LocalCluster(
+                n_workers=self._workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=self._memory,
+                dashboard_address=None,
+            )
+        except RuntimeError as error:
+            raise FaceError(f"Dask's workers on this machine did not start ({error}), {ADVICE}") from error
 
     def run(self, job: Job, folder: str, tiles: Sequence[int], done: Callable[[int], None]) -> None:
         """Run `job` on each tile, and call `done` with its number when it is finished.
@@ -76,11 +85,11 @@ class Dask:
         Raises
         ------
         FaceError
-            A tile was lost with its worker again and again.
+            A tile was lost with its worker again and again, or all workers of this machine were.
         """
         waiting = iter(tiles)
         threads = max(1, sum(self._client.nthreads().values()))
-        running = self._distributed.as_completed(loop=self._client.loop)
+        running: set[Any] = set()
 
         def submit() -> None:
             for tile in waiting:
@@ -91,11 +100,25 @@ class Dask:
         for _ in range(TILES_A_THREAD * threads):
             submit()
         try:
-            for future in running:
-                done(future.result())
-                submit()
+            while running:
+                for future in self._finished(running):
+                    running.discard(future)
+                    done(future.result())
+                    submit()
         except self._distributed.KilledWorker as error:
-            raise FaceError(
-                f"Dask lost the workers of a tile again and again, probably for lack of memory ({error}): "
-                "lower Execution.tile_points, or give the workers more memory"
-            ) from error
+            raise FaceError(f"Dask lost the workers of a tile again and again ({error}), {ADVICE}") from error
+
+    def _finished(self, running: set[Any]) -> set[Any]:
+        """Wait until some are."""
+        warned = False
+        while True:
+            try:
+                with self._client.as_current():
+                    return set(self._distributed.wait(running, timeout=PATIENCE, return_when="FIRST_COMPLETED").done)
+            except TimeoutError:
+                # One that is killed while it starts is not started again, and tasks wait for workers for ever.
+                if self._cluster is not None and not self._cluster.workers:
+                    raise FaceError(f"all of Dask's workers on this machine were lost, {ADVICE}") from None
+                if not warned and not self._client.nthreads():
+                    log.warning("Dask has no workers, %d tiles wait for some", len(running))
+                    warned = True

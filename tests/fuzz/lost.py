@@ -7,9 +7,7 @@ import signal
 import threading
 from functools import cache
 from pathlib import Path
-from typing import Any
 
-import distributed
 import numpy as np
 import psutil
 
@@ -19,29 +17,22 @@ POINTS = shapes.sphere(4000).points
 
 
 @cache
-def client() -> Any:
-    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
-    return distributed.Client(cluster, set_as_default=False)
-
-
-@cache
 def expected() -> Result:
     return estimate_normals(POINTS, execution=Execution(tile_points=1000, engine="serial"))
 
 
 def prepare() -> None:
     expected()
-    client()
 
 
 def children() -> set[int]:
     return {child.pid for child in psutil.Process().children() if "resource_tracker" not in " ".join(child.cmdline())}
 
 
-def kill(engine: str, others: set[int], number: int) -> None:
+def kill(number: int) -> None:
     """Kill one of the workers that there are at the moment."""
     try:
-        pids = list(client().run(os.getpid).values()) if engine == "dask" else sorted(children() - others)
+        pids = sorted(children())
         if pids:
             os.kill(pids[number % len(pids)], signal.SIGKILL)
     except (OSError, psutil.Error):  # it has just ended by itself
@@ -51,11 +42,9 @@ def kill(engine: str, others: set[int], number: int) -> None:
 def case(seed: int, folder: Path) -> str:
     rng = np.random.default_rng([seed, 7])
     engine = str(rng.choice(["processes", "dask"]))
-    settings = Execution(tile_points=1000, engine=client() if engine == "dask" else engine, workers=2)
-    others = children()
+    settings = Execution(tile_points=1000, engine=engine, workers=2)
     timers = [
-        threading.Timer(float(rng.uniform(0, 4)), kill, (engine, others, int(rng.integers(9))))
-        for _ in range(rng.integers(1, 4))
+        threading.Timer(float(rng.uniform(0, 4)), kill, (int(rng.integers(9)),)) for _ in range(rng.integers(1, 4))
     ]
     for timer in timers:
         timer.start()

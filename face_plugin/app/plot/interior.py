@@ -123,11 +123,11 @@ def _draw_reached(
     plt: Matplotlib, axes: Any, shown: Array, reached: Callable[[Array], NDArray[np.bool_]], section: Section
 ) -> None:
     places, (left, right, bottom, top) = section.grid(shown, PIXELS, MARGIN)
-    free = reached(places.reshape(-1, 3)).reshape(places.shape[:2])
+    rows, columns, _ = places.shape
     axes.contourf(
-        np.linspace(left, right, free.shape[1]),
-        np.linspace(bottom, top, free.shape[0]),
-        free,
+        np.linspace(left, right, columns),
+        np.linspace(bottom, top, rows),
+        reached(places.reshape(-1, 3)).reshape(rows, columns),
         levels=[0.5, 1.5],
         colors=[REACHED],
         zorder=0,

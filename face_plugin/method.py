@@ -26,22 +26,15 @@ from face_plugin.faraday.solve import SolvedCage, solve_cage
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
+from face_plugin.sides.blind import sides_as_seen, sides_by_field
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
-from face_plugin.sides.enclosure import DARK
 from face_plugin.sides.facing import resettled, sides_by_sensors
-from face_plugin.sides.parts import open_parts, parts
-from face_plugin.sides.patches import Planes, planes_of, turned_patches
-from face_plugin.sides.reach import out_of_reach
+from face_plugin.sides.patches import planes_of
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
-from face_plugin.sides.steps import turn_sides
-from face_plugin.sides.vantage import is_open, sides_from_vantage
+from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
 
 __all__ = ["Solved", "orient", "refine", "refine_curves", "solve_field"]
-
-
-# Share of what the field says that must say the same to be one voice: all on a bent sheet, 0.92 on generated streets.
-ONE_VOICE = 0.97
 
 
 @dataclass(frozen=True)
@@ -184,12 +177,12 @@ def refine(
 
     # 1. Side.
     planes = planes_of(around)
-    side = blind = _sides_by_field(around, field, sheets or find_sheets(around), planes, still, plate)
+    side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, still, plate)
     if sights is not None:
         side = sides_by_sensors(around, sights, unit(blind), planes)
     elif is_open(field.difference) and not still.any():
         # What is thinner than the spacing has both of its sides in one place: only the field tells them apart.
-        side = np.where(plate[:, None], side, _sides_as_seen(around, field, side, planes))
+        side = np.where(plate[:, None], side, sides_as_seen(around, field, side, planes))
     del planes
 
     # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending
@@ -242,53 +235,3 @@ def refine_curves(around: Neighbourhood, field: FieldAtPoints) -> NDArray[np.flo
     turned = turn_to_curves(around, turned.normals, signed=True)
     # A handful of points is no curve: the field knows as much.
     return np.where(np.isfinite(turned.error)[:, None], turned.normals, field.normals)
-
-
-def _sides_by_field(
-    around: Neighbourhood,
-    field: FieldAtPoints,
-    sheets: Sheets,
-    planes: Planes,
-    still: NDArray[np.bool_],
-    plate: NDArray[np.bool_],
-) -> NDArray[np.float64]:
-    """Find normals (n, 3) of the side that the field, the neighbours and the winding number tell together."""
-    votes, kept = field.votes, plate | still
-    # Stray votes turn round to those around them.
-    side = turn_sides(around, votes, field.strength, sheets, kept)
-    # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
-    # Of a cloud seen in part, what is sealed off is not judged by how it fits in: most of that is not there.
-    reached = field.strength > DARK if still.any() else None
-
-    for along in (planes, None, None):
-        turned = turned_patches(around, unit(side), _field_says(field, side), planes=along, reached=reached) & ~kept
-        if turned.any():
-            side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
-        elif along is None:
-            # Asked again of the same sides, it would say the same.
-            break
-    if still.any() or is_open(field.difference):
-        # Of a cloud seen in part, it is not known where outside is; and around an open sheet all is outside.
-        return side
-    # In a cavity the field may be a leak, and all that is around agree on the wrong side.
-    turned = out_of_reach(around, unit(side)) & ~kept
-    return np.where(turned[:, None], -side, side)
-
-
-def _sides_as_seen(
-    around: Neighbourhood, field: FieldAtPoints, side: NDArray[np.float64], planes: Planes
-) -> NDArray[np.float64]:
-    """Turn normals (n, 3) of an open scan so that parts that no sheet joins are on one side, as seen from one place."""
-    side = sides_from_vantage(around, side, planes)
-    says = _field_says(field, side)
-    # Of the two sides that leaves, a bent sheet knows its outer one, where the field speaks with one voice.
-    if says.sum() < -ONE_VOICE * np.abs(says).sum():
-        return -side
-    # Closed bodies among the parts know theirs.
-    closed = ~open_parts(parts(around, unit(side)), field)
-    return -side if says[closed].sum() < 0 else side
-
-
-def _field_says(field: FieldAtPoints, normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weigh what the field says of normals (n, 3): in [-1, 1], positive where they point to the lit side."""
-    return np.asarray(field.lean * np.einsum("nd,nd->n", field.votes, normals))

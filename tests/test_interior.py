@@ -15,6 +15,9 @@ SOLIDS = {
     "crossed cylinders": lambda: shapes.crossed_cylinders(4000, 0),
     "shelves in a box": lambda: shapes.shelves(6000, 0),
     "two spheres": lambda: shapes.two_spheres(4000, 0),
+    "legs, lid, spout and handle in a teapot": lambda: shapes.teapot(10000, 0),
+    "the same with a box": lambda: shapes.demo_shape(6000, 0),
+    "the same again": lambda: shapes.demo_shape(6000, 2),
 }
 
 

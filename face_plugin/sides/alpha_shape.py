@@ -51,6 +51,7 @@ class AlphaShapes:
             held = (np.linalg.norm(points[apex] - centre, axis=2) < circle).any(axis=0)
             sphere = np.append(_spheres(*(points[corners[:, k]] for k in range(4))), np.inf)
         self._facet, self._of, self._beyond, self._count = facet, of, beyond, outside
+        self._corners, self._sphere = corners, sphere[:-1]
         self._passes = np.where(held, np.minimum(sphere[of], sphere[beyond]), circle)
 
     def outside(self, radius: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -66,6 +67,10 @@ class AlphaShapes:
         link = coo_matrix((np.ones(through.sum()), (self._of[through], self._beyond[through])), shape=(size, size))
         label = connected_components(link, directed=False)[1]
         return np.asarray(label[:-1] == label[-1])
+
+    def roomy(self, radius: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which tetrahedra (t,) the ball fits between the points of; `radius` as of `outside`."""
+        return np.asarray(self._sphere > radius[self._corners].mean(axis=1))
 
 
 def _circles(

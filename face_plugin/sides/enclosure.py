@@ -20,8 +20,9 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import ALPHAS
 from face_plugin.sides.graph import Edges, connected_parts
 from face_plugin.sides.patches import SMALLEST
+from face_plugin.sides.seams import both_alone
 
-__all__ = ["automatic_alpha", "enclosed", "threshold"]
+__all__ = ["ALPHA_BOUNDS", "DARK", "automatic_alpha", "enclosed", "threshold"]
 
 # Winding numbers above which a point is enclosed by the others: at the point itself the paper's threshold (the surface
 # has 1/2, its concave edges 3/4); a step outward somewhat more than that of the surface; and there, with the points
@@ -46,6 +47,11 @@ ACROSS = -0.5
 ENCLOSED_WIDTH = 0.5
 # Points inside are joined to so many of their nearest.
 JOINED = 8
+# An edge leads along the sheet if it leaves the tangent plane by less than this (sine).
+AHEAD = 0.5
+# Where a part ends, another sheet passes within this many spacings if it is cut off there: points count as enclosed
+# only some way behind it.
+CROSSING = 3.0
 # Points with less field than this take no part in the next pass where their number exceeds the pass's bound, which
 # rises as the numbers get clearer. No dent that is open to the outside is as dark.
 DARK = 1e-4
@@ -109,7 +115,31 @@ def enclosed(
     # What lies inside is a surface of its own. Fewer points are the deepest of a noisy sheet, or of a narrow slot.
     joined = around.neighbour[:, 1 : JOINED + 1]
     edges = Edges(np.repeat(np.arange(len(points)), joined.shape[1]), joined.ravel())
-    return np.asarray(connected_parts(found, edges, SMALLEST)[0] >= 0)
+    part, count = connected_parts(found, edges, SMALLEST)
+    bounded = ~_goes_on(around, normals, part, count, edges)
+    return np.asarray((part >= 0) & np.append(bounded, False)[part])
+
+
+def _goes_on(
+    around: Neighbourhood, normals: NDArray[np.float64], part: NDArray[np.intp], count: int, edges: Edges
+) -> NDArray[np.bool_]:
+    """Whether parts (count,) of what is enclosed go on outside without passing another sheet, as those of a scroll do.
+
+    Inside and outside meet where sheets cross. Where a sheet leads from one to the other by itself, its points are
+    enclosed by degrees, and free space gets to them along it.
+    """
+    first, second = edges.first, edges.second
+    # A few points amid a part that do not count as enclosed are no outside.
+    outside = connected_parts(part < 0, edges, SMALLEST)[0] >= 0
+    rim = (part[first] >= 0) & outside[second]
+    first, second = first[rim], second[rim]
+    offset = around.points[second] - around.points[first]
+    height = np.abs(np.einsum("nd,nd->n", offset, normals[first]))
+    ahead = height < AHEAD * np.linalg.norm(offset, axis=1)
+    first, second = first[ahead], second[ahead]
+    free = both_alone(around, normals, first, second, CROSSING)
+    size = np.bincount(part[first], minlength=count)
+    return np.asarray(2 * np.bincount(part[first], free, minlength=count) > size)
 
 
 def _out_of_creases(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.float64]:

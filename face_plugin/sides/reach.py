@@ -20,7 +20,7 @@ from face_plugin.sides.clusters import cluster_signs, where_better
 from face_plugin.sides.graph import connected_parts, couplings, neighbours_around
 from face_plugin.sides.patches import SMALLEST, winding_number
 
-__all__ = ["out_of_reach", "reach", "reached_places"]
+__all__ = ["out_of_reach", "reach", "reached_places", "sealed_behind"]
 
 # Radius of the ball that free space spreads as, in spacings: the least, for even samplings, and so much more a unit of
 # the coefficient of variation of the nearest distances, which is 0.05 to 0.1 on even samplings and 0.52 at random.
@@ -29,6 +29,9 @@ WIDE, WIDER = 1.25, 1.5
 # Balls that are tried, in that radius: at random the widest gap of a million points is half as wide again as that of
 # ten thousand.
 WIDENED = (1.0, 1.15, 1.3, 1.5)
+# Space is wide if a ball so much larger fits in: in a bore that the ball does not get into, gaps of its wall make room
+# for one as large here and there.
+ROOMY = 1.15
 # Points are moved by at most so many spacings before they are meshed: rows are the worst case of meshers.
 OUT_OF_ROWS = 1e-3
 # A point is inside out where the winding number of the others is farther than this from the surface's 1/2.
@@ -111,6 +114,27 @@ def reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.flo
     return _reached(around, normals, tetrahedralize(_out_of_rows(around)))[1]
 
 
+def sealed_behind(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which points (n,) have space behind them that is wide, and that free space does not get to from outside.
+
+    Matter is, and so is the inside of a body within another. What faces it is the wall of a cavity.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> around = Neighbourhood(ball.points)
+    >>> bool(sealed_behind(around, ball.normals).mean() > 0.9), bool(sealed_behind(around, -ball.normals).any())
+    (True, False)
+    """
+    corners = tetrahedralize(_out_of_rows(around))
+    reached, _, roomy = _reached(around, normals, corners)
+    behind = ~_in_front(around.points, normals, corners)
+    count = np.bincount(corners[behind], minlength=len(around))
+    sealed = np.bincount(corners[behind & (roomy & ~reached)[:, None]], minlength=len(around))
+    return np.asarray(2 * sealed > count)
+
+
 def reached_places(
     around: Neighbourhood, normals: NDArray[np.float64], places: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
@@ -125,15 +149,15 @@ def reached_places(
     [True, True, False]
     """
     mesh = Delaunay(_out_of_rows(around))
-    reached, _ = _reached(around, normals, mesh.simplices)
+    reached, _, _ = _reached(around, normals, mesh.simplices)
     at = mesh.find_simplex(places)
     return np.asarray((at < 0) | reached[at])
 
 
 def _reached(
     around: Neighbourhood, normals: NDArray[np.float64], corners: NDArray[np.int32]
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Tetrahedra (t,) that are reached, and what `reach` returns.
+) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.bool_]]:
+    """Tetrahedra (t,) that are reached, what `reach` returns, and tetrahedra that a larger one fits into.
 
     A single gap of the sampling lets a ball in, and then all is reached; a ball that is too wide gets into no cavity.
     That ball is taken that leaves most points with free space on one side alone.
@@ -144,7 +168,9 @@ def _reached(
     tried = []
     for widening in WIDENED:
         reached = shapes.outside(widening * ball)
-        tried.append((reached, _evidence(len(around), corners, in_front, reached)))
+        tried.append(
+            (reached, _evidence(len(around), corners, in_front, reached), shapes.roomy(ROOMY * widening * ball))
+        )
     return max(tried, key=lambda found: float(np.abs(found[1]).mean()))
 
 

@@ -195,6 +195,26 @@ def test_full_disk_names_the_path(tmp_path: Path, suffix: str) -> None:
     assert os.listdir(tmp_path) == [path.name]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot limit the size of files")
+def test_what_the_compressor_of_laz_cannot_write_is_a_full_disk(tmp_path: Path) -> None:
+    """Wherever in its work the disk fills up; the compressor says no more than that it failed."""
+    import resource
+
+    many = np.random.default_rng(0).normal(size=(2500, 3))
+    write_cloud(tmp_path / "whole.laz", CloudFile(many))
+    size = (tmp_path / "whole.laz").stat().st_size
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for limit in range(400, size, 1024):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limits[1]))
+        try:
+            with pytest.raises(OSError, match=r"a\.laz") as caught:
+                write_cloud(tmp_path / "a.laz", CloudFile(many))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert caught.value.errno == errno.EFBIG
+    assert os.listdir(tmp_path) == ["whole.laz"]
+
+
 def test_missing_folder_names_the_path(tmp_path: Path) -> None:
     path = tmp_path / "none" / "a.ply"
     with pytest.raises(FileNotFoundError) as caught:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +19,9 @@ from face_plugin.io.names import COLOUR, with_colours
 
 # The names under which PDAL and CloudCompare keep normals in extra bytes.
 LAS_NORMAL = ("NormalX", "NormalY", "NormalZ")
+
+ASKED = 1 << 20
+"""Bytes written to a file that the compressor could not write to, to be told why."""
 
 
 def read(path: Path) -> CloudFile:
@@ -90,9 +95,17 @@ def las_writer(laspy: ModuleType, path: Path, header: Any) -> Iterator[Any]:
     """Open a LAS or LAZ file to write points into."""
     # Sound files hold names of software in letters that LAS does not allow: the points are what counts.
     options = {"do_compress": path.suffix.lower() == ".laz", "encoding_errors": "replace", "closefd": False}
-    # The stream is ours: closing it says what a full disk is, which the compressor does not.
-    with path.open("wb+") as stream, laspy.open(stream, mode="w", header=header, **options) as writer:
-        yield writer
+    with path.open("wb+") as stream:
+        try:
+            with laspy.open(stream, mode="w", header=header, **options) as writer:
+                yield writer
+        except Exception as error:
+            if type(error).__name__ != "LazrsError":
+                raise
+            # The compressor does not say what the system told it, such as that the disk is full: more of the same does.
+            stream.write(bytes(ASKED))
+            stream.flush()
+            raise OSError(errno.EIO, f"{os.strerror(errno.EIO)} ({error})") from error
 
 
 def _has_wide_colours(attributes: Mapping[str, Array]) -> bool:

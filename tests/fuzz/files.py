@@ -23,7 +23,7 @@ def read_mutated(path: Path, content: bytes, rng: np.random.Generator) -> str:
         return "refused by name"
     if path.suffix in CLOUD_SUFFIXES:
         keep = rng.random(len(cloud)) < 0.7
-        write_cloud(path, cloud, normals=np.zeros((len(cloud), 3)), keep=keep)
+        write_cloud(path, cloud, normals=np.zeros_like(cloud.points), keep=keep)
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]
     return "read"
 

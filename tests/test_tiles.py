@@ -292,3 +292,12 @@ def test_a_tile_done_is_not_solved_again(tmp_path, monkeypatch):
     before = store.path(0, "field").stat().st_mtime_ns
     assert solve_tile(str(tmp_path), 0) == 0
     assert store.path(0, "field").stat().st_mtime_ns == before
+
+
+def test_what_is_inside_a_solid_is_found_in_tiles():
+    """Parts that cross, and a box, in a body that no tile sees in full."""
+    body = demo_shape(20000, 2)
+    execution = Execution(tile_points=8000, engine="serial")
+    found = estimate_normals(body.points, filter_interior=True, execution=execution).interior
+    assert found[body.interior].mean() > 0.95
+    assert found[~body.interior].mean() < 0.002

@@ -72,7 +72,7 @@ def sides_by_field(
 
     for along in (planes, None, None):
         facing = unit(side)
-        sealed = None if still.any() else partial(_sealed, around, facing, field.strength)
+        sealed = partial(_sealed, around, facing, field.strength)
         turned = turned_patches(around, facing, _field_says(field, side), planes=along, lit=lit, sealed=sealed) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)

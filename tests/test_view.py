@@ -61,6 +61,7 @@ class Hand:
 
     def __init__(self, session, tmp_path):
         files = {"sculpt_file": tmp_path / "edits.json", "mesh_file": tmp_path / "mesh.ply"}
+        files["viewpoints_file"] = tmp_path / "views.csv"
         self.viewer = Viewer(session, headless=True, size=SIZE, **files)
         self.viewer._gui = self.spy = Spy()
         # Peeling layer after layer takes a software renderer long, and changes no click.

@@ -23,7 +23,7 @@ from face_plugin.faraday import field
 from face_plugin.faraday.domain import Box
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.faraday.solve import SolvedCage, solve_cage
-from face_plugin.geometry import unit
+from face_plugin.geometry import thin, unit
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.blind import sides_as_seen, sides_by_field
@@ -79,12 +79,13 @@ def solve_field(
             separation, sheets = curve_separation(around, spacing, coarsen=coarsen), None
         else:
             separation, sheets = cage_separation(around, spacing, coarsen=coarsen)
+        rows = thin(around.points, separation, params.seed, (around.distance, around.neighbour))
     points = around.points
     # The neighbours take a tenth of the memory of what follows: who needs them no more need not hold them.
     del around
     # Balls (3.1), the box around them, the mesh between, and the potential of three basis fields (3.2).
     cage = solve_cage(
-        points, separation, params, box=box, given=given, cage_value=cage_value, memory=memory, stage=stage
+        points, rows, params, box=box, given=given, cage_value=cage_value, memory=memory, stage=stage
     )
     # The greatest strength that an external field of any direction causes (3.3).
     with stage("field"):
@@ -162,7 +163,7 @@ def refine(
 
     Examples
     --------
-    >>> from face_plugin.geometry import unit
+    >>> from face_plugin.geometry import thin, unit
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(500)
     >>> rough = unit(ball.normals + 0.3 * np.random.default_rng(0).normal(size=(500, 3)))

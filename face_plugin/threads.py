@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -12,7 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-__all__ = ["KDTree", "in_threads"]
+from face_plugin.memory import usable_cores
+
+__all__ = ["KDTree", "in_threads", "one_core"]
+
+_alone: list[bool] = [False]
+
+
+def one_core() -> None:
+    """Use no more than one core from now on: as many other processes as there are cores do the same."""
+    _alone[0] = True
 
 
 def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> None:
@@ -20,7 +28,10 @@ def in_threads(run: Callable[[slice], None], count: int, least: int = 512) -> No
 
     A core gets at least `least` rows.
     """
-    pieces = max(1, min(os.cpu_count() or 1, count // least))
+    pieces = 1 if _alone[0] else min(usable_cores(), count // least)
+    if pieces <= 1:
+        run(slice(0, count))
+        return
     bounds = np.linspace(0, count, 4 * pieces + 1).astype(int)
     slices = [slice(a, b) for a, b in itertools.pairwise(bounds)]
     with ThreadPoolExecutor(pieces) as pool:

@@ -27,7 +27,6 @@ class PlaneTree(DipoleTree):
     Parameters
     ----------
     points : (n, 2) float64
-        In an order in which neighbours are near, such as Morton order; any order gives the same result, slower.
     lengths : (n,) float64, in the unit of the points
 
     Examples
@@ -42,30 +41,23 @@ class PlaneTree(DipoleTree):
     def __init__(self, points: NDArray[np.float64], lengths: NDArray[np.float64]) -> None:
         super().__init__(np.column_stack([points, np.zeros(len(points))]), lengths)
 
-    def _evaluate(
+    def _add_sums(
         self,
-        normals: NDArray[np.float64],
+        queries: NDArray[np.float64],
+        themselves: bool,
+        dipoles: NDArray[np.float64],
         eps: NDArray[np.float64],
+        moments: NDArray[np.float64],
         opening: float,
-        positions: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """Columns of -4 pi grad w, the third of zeros, and 4 pi w."""
-        dipoles = np.ascontiguousarray(normals * self.areas[:, None])
-        # A node is a run of the order: its moment is a difference of running sums.
-        running = np.concatenate([np.zeros((1, 2)), np.cumsum(dipoles, axis=0)])
-        moments = running[self._stop] - running[self._start]
-        themselves = positions is None
-        queries = self.points if positions is None else np.ascontiguousarray(positions)
-        out = np.zeros((len(queries), 4))
-
+        out: NDArray[np.float64],
+    ) -> None:
         def run(rows: slice) -> None:
             _sums(
-                rows.start, rows.stop, queries, themselves, self.points, dipoles, eps, self._start, self._stop,
+                rows.start, rows.stop, queries, themselves, self._points, dipoles, eps, self._start, self._stop,
                 self._child, self._centre, self._radius, moments, opening, np.empty(STACK, dtype=np.int64), out,
             )  # fmt: skip
 
         in_threads(run, len(queries))
-        return out
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -8,7 +8,8 @@ from scipy.spatial import cKDTree
 
 from face_plugin import shapes
 from face_plugin.angles.fits import fit_surfaces
-from face_plugin.angles.noise import find_noise, medians, on_lattice
+from face_plugin.angles.noise import find_noise, on_lattice
+from face_plugin.medians import medians
 
 
 def found(points, normals):

@@ -11,6 +11,7 @@ from face_plugin.faraday.gradient import ball_means
 from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.poisson import Poisson
 from face_plugin.faraday.solve import solve_cage
+from face_plugin.geometry import thin
 from face_plugin.io.sources import ArraySource
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.shapes import demo_shape, sphere
@@ -66,13 +67,13 @@ def test_the_error_of_the_transfer_decays_with_the_halo(tmp_path):
     params = store.params
     coarse = solve_coarse(voxels, params)
     cloud = np.array(store.points())
-    one = solve_cage(cloud, np.zeros(len(cloud)), params)
+    one = solve_cage(cloud, np.arange(len(cloud)), params)
     exact = Coarse(one.mesh, one.potential, one.cage_value, Locator(one.mesh))
 
     def strength(part, around):
         level = solve_cage(
             part.points,
-            cage_separation(Neighbourhood(part.points), None)[0],
+            thin(part.points, cage_separation(Neighbourhood(part.points), None)[0], params.seed),
             params,
             box=Box(part.lower - part.spacing, part.upper + part.spacing),
             given=around.at,

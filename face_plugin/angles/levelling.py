@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.geometry import ramp, unit
+from face_plugin.medians import medians
 from face_plugin.winding import DipoleTree
 
 __all__ = ["level", "level_weight"]
@@ -98,10 +99,10 @@ def level(
     True
     """
     for step in range(STEPS):
-        off = AREA * tree.number(normals, width, opening=OPENING) - 0.5
+        off = AREA * tree.number(normals, width) - 0.5
         if step == 0:
-            around = np.abs(off)[neighbour[:, : AROUND + 1]]
-            weight = weight * (1.0 - ramp(np.median(around, axis=1), LEVEL)) * (width > 0)
+            typical = medians(np.abs(off), neighbour[:, : AROUND + 1])
+            weight = weight * (1.0 - ramp(typical, LEVEL)) * (width > 0)
             width = np.where(weight > 0, width, 0.0)
         charge = weight * np.where(np.abs(off) < FARTHEST, np.clip(off, -FAR, FAR), 0.0)
         turn = [tree.number(np.outer(charge, axis), width, opening=OPENING) for axis in np.eye(3)]

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.angles.fits import SIZES, LocalFits
-from face_plugin.compiled import compiled
-from face_plugin.threads import in_threads
+from face_plugin.medians import medians
 
 __all__ = ["find_noise", "on_lattice"]
 
@@ -78,37 +77,5 @@ def on_lattice(points: NDArray[np.float64], neighbour: NDArray[np.intp]) -> bool
     length = np.median(np.linalg.norm(offset, axis=1))
     steps = np.clip(np.rint(offset / (ALIKE * length)), -(2**19), 2**19).astype(np.int64)
     # One whole number an offset; that of the opposite one is its negative.
-    key = np.abs(steps @ np.array([1, 2**20, 2**40]))
-    return bool(OFFSETS * len(np.unique(key)) < len(points))
-
-
-def medians(values: NDArray[np.float64], neighbour: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Medians (n,) of the finite values (n,) at each point's neighbours (n, k); infinite where there are none.
-
-    Examples
-    --------
-    >>> medians(np.array([1.0, 2.0, np.inf, 9.0]), np.array([[0, 1, 3], [2, 2, 2]]))
-    array([ 2., inf])
-    """
-    out = np.empty(len(neighbour))
-    values, neighbour = np.ascontiguousarray(values), np.ascontiguousarray(neighbour)
-    in_threads(lambda rows: _medians(rows.start, rows.stop, values, neighbour, out), len(neighbour))
-    return out
-
-
-@compiled(nogil=True)
-def _medians(first, last, values, neighbour, out):  # type: ignore[no-untyped-def]
-    ordered = np.empty(neighbour.shape[1])
-    for i in range(first, last):
-        m = 0
-        for k in range(neighbour.shape[1]):
-            value = values[neighbour[i, k]]
-            if value == np.inf:
-                continue
-            place = m
-            while place > 0 and ordered[place - 1] > value:
-                ordered[place] = ordered[place - 1]
-                place -= 1
-            ordered[place] = value
-            m += 1
-        out[i] = ordered[m // 2] if m > 0 else np.inf
+    key = np.sort(np.abs(steps @ np.array([1, 2**20, 2**40])))
+    return bool(OFFSETS * np.count_nonzero(np.diff(key, prepend=-1)) < len(points))

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from face_plugin.angles.choice import FLATNESS, LEAST, combine_fits
 from face_plugin.angles.fits import LocalFits, fit_surfaces
-from face_plugin.angles.noise import find_noise, medians
+from face_plugin.angles.noise import find_noise
 from face_plugin.geometry import unit
+from face_plugin.medians import medians
 from face_plugin.neighbourhood import Neighbourhood
 
 __all__ = ["Turned", "turn_angles"]

@@ -17,7 +17,7 @@ from face_plugin.faraday.domain import Box, padded_box
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.meshers.select import build_mesh
 from face_plugin.faraday.poisson import Poisson
-from face_plugin.geometry import local_spacing, thin
+from face_plugin.geometry import local_spacing
 from face_plugin.params import Params
 from face_plugin.stages import Stage
 
@@ -49,7 +49,7 @@ class SolvedCage:
 
 def solve_cage(
     points: NDArray[np.float64],
-    separation: NDArray[np.float64],
+    rows: NDArray[np.intp],
     params: Params,
     *,
     box: Box | None = None,
@@ -64,8 +64,8 @@ def solve_cage(
     ----------
     points : (n, d) float64, distinct, in the canonical frame
         d is 3, or 2 in the plane.
-    separation : (n,) float64
-        Smallest distance between balls at each point.
+    rows : (k,) intp
+        Points that become balls.
     params : Params
     box : Box, optional
         By default that around the balls, padded as `params` says.
@@ -90,7 +90,7 @@ def solve_cage(
     for attempt in range(ATTEMPTS):
         try:
             another = dataclasses.replace(params, seed=params.seed + attempt)
-            balls, mesh = _mesh(points, separation, another, box, memory, stage)
+            balls, mesh = _mesh(points, rows, another, box, memory, stage)
             break
         except MeshingError as error:
             if attempt == ATTEMPTS - 1:
@@ -106,15 +106,14 @@ def solve_cage(
 
 def _mesh(
     points: NDArray[np.float64],
-    separation: NDArray[np.float64],
+    rows: NDArray[np.intp],
     params: Params,
     box: Box | None,
     memory: float | None,
     stage: Stage,
 ) -> tuple[Balls, CageMesh]:
-    # The domain: a box without conducting balls, no two of which are nearer than their separation.
+    # The domain: a box without conducting balls.
     with stage("domain"):
-        rows = thin(points, separation, params.seed)
         balls = build_balls(points, rows, radius=params.ball_radius, solid=params.solid, seed=params.seed)
         if box is not None:
             balls = _within(balls, box)

@@ -13,7 +13,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.enclosure import ALPHA_BOUNDS, DARK
 from face_plugin.sides.parts import open_parts, parts
 from face_plugin.sides.patches import Planes, turned_patches
-from face_plugin.sides.reach import out_of_reach, sealed_behind
+from face_plugin.sides.reach import Reach, out_of_reach
 from face_plugin.sides.seams import across_seams
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.steps import turn_sides
@@ -64,6 +64,7 @@ def sides_by_field(
     True
     """
     votes, kept = field.votes, plate | still
+    reach = Reach(around)
     # Stray votes turn round to those around them.
     side = turn_sides(around, votes, field.strength, sheets, kept)
     # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.
@@ -72,7 +73,7 @@ def sides_by_field(
 
     for along in (planes, None, None):
         facing = unit(side)
-        sealed = partial(_sealed, around, facing, field.strength)
+        sealed = partial(_sealed, reach, facing, field.strength)
         turned = turned_patches(around, facing, _field_says(field, side), planes=along, lit=lit, sealed=sealed) & ~kept
         if turned.any():
             side = turn_sides(around, np.where(turned[:, None], -side, side), field.strength, sheets, kept)
@@ -84,7 +85,7 @@ def sides_by_field(
         return side
     if not is_open(field.difference):
         # In a cavity the field may be a leak, and all that is around agree on the wrong side.
-        turned = out_of_reach(around, unit(side)) & ~kept
+        turned = out_of_reach(reach, unit(side)) & ~kept
         side = np.where(turned[:, None], -side, side)
     # No smooth sheet changes its side.
     turned = across_seams(around, unit(side), _field_says(field, side), planes) & ~kept
@@ -92,12 +93,12 @@ def sides_by_field(
 
 
 def _sealed(
-    around: Neighbourhood, facing: NDArray[np.float64], strength: NDArray[np.float64], asked: NDArray[np.bool_]
+    reach: Reach, facing: NDArray[np.float64], strength: NDArray[np.float64], asked: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Which points (n,) have space behind them that is sealed off, as far as it is asked."""
     # What is brighter is not inside, whatever alpha.
     dim = strength < ALPHA_BOUNDS[0]
-    return dim & sealed_behind(around, facing) if (dim & asked).any() else np.zeros(len(around), dtype=np.bool_)
+    return dim & reach.sealed_behind(facing) if (dim & asked).any() else np.zeros(len(dim), dtype=np.bool_)
 
 
 def sides_as_seen(

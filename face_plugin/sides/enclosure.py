@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.geometry import unit
+from face_plugin.medians import medians
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import ALPHAS
 from face_plugin.sides.graph import Edges, connected_parts
@@ -160,7 +161,7 @@ def _scatters(around: Neighbourhood, normals: NDArray[np.float64], rows: NDArray
     # Noise is the sensor's, and all over the cloud: where it is not, scatter is a tangle of parts.
     if np.median(scatter) < SCATTER:
         return np.zeros(len(rows), dtype=np.bool_)
-    return np.asarray(np.median(scatter[around.neighbour[rows]], axis=1) > SCATTER)
+    return np.asarray(medians(scatter, around.neighbour[rows]) > SCATTER)
 
 
 def _band(around: Neighbourhood, normals: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -66,7 +66,8 @@ def neighbours_around(around: Neighbourhood, lines: NDArray[np.float64]) -> Edge
     one, other = np.repeat(np.arange(count), SECTORS), found.ravel()
     one, other = one[other >= 0], other[other >= 0]
     # Each pair once, in an order that the points alone decide.
-    pair = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
+    pair = np.sort(np.minimum(one, other) * count + np.maximum(one, other))
+    pair = pair[np.diff(pair, prepend=-1) > 0]
     return Edges(pair // count, pair % count)
 
 

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.geometry import plane_fits
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.planes import plane_fits
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 
@@ -34,8 +34,6 @@ __all__ = ["HOLD_FIELD", "SMALLEST", "Planes", "closure", "planes_of", "turned_p
 PLANE_NEIGHBOURS = 30
 # Width of the kernel of the winding number, in spacings.
 WIDTH = 0.3
-# The side bears a coarse sum.
-OPENING = 0.6
 # Evidence of a point next to its couplings, which are 1 at most: closure, and the field.
 HOLD_CLOSED = 0.1
 HOLD_FIELD = 0.03
@@ -77,7 +75,7 @@ def winding_number(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArr
     >>> bool(np.abs(winding_number(Neighbourhood(ball.points), ball.normals) - 0.5).max() < 0.2)
     True
     """
-    return np.asarray(around.tree.number(normals, WIDTH * around.spacing, opening=OPENING))
+    return np.asarray(around.tree.number(normals, WIDTH * around.spacing))
 
 
 class Planes(NamedTuple):

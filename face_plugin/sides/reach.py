@@ -8,6 +8,7 @@ sampling. A point with free space on one side, and none on the other, knows its 
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from face_plugin.sides.clusters import cluster_signs, where_better
 from face_plugin.sides.graph import connected_parts, couplings, neighbours_around
 from face_plugin.sides.patches import SMALLEST, winding_number
 
-__all__ = ["out_of_reach", "reach", "reached_places", "sealed_behind"]
+__all__ = ["Reach", "out_of_reach"]
 
 # Radius of the ball that free space spreads as, in spacings: the least, for even samplings, and so much more a unit of
 # the coefficient of variation of the nearest distances, which is 0.05 to 0.1 on even samplings and 0.52 at random.
@@ -46,14 +47,138 @@ CERTAIN = 4.0
 FITS = 1 / 3
 
 
-def out_of_reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+class Reach:
+    """Where free space gets to between points, and on which side of them that is.
+
+    Of several balls that one counts that leaves most points with free space on one side alone: a single gap of the
+    sampling lets a ball in, and then all is reached; one that is too wide gets into no cavity.
+
+    Parameters
+    ----------
+    around : Neighbourhood
+        Of n points.
+    mesh : Delaunay, optional
+        Of `Reach.out_of_rows`; by default the fastest mesher at hand makes one.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(500)
+    >>> reach = Reach(Neighbourhood(ball.points))
+    >>> bool(reach.evidence(ball.normals).mean() > 0.9), bool(reach.evidence(-ball.normals).mean() < -0.9)
+    (True, True)
+    """
+
+    def __init__(self, around: Neighbourhood, mesh: Delaunay | None = None) -> None:
+        self.around = around
+        self._mesh = mesh
+
+    @staticmethod
+    def out_of_rows(around: Neighbourhood) -> NDArray[np.float64]:
+        """Points (n, 3), moved a little."""
+        moved = np.random.default_rng(0).uniform(-OUT_OF_ROWS, OUT_OF_ROWS, around.points.shape)
+        return np.asarray(around.points + moved * around.spacing[:, None])
+
+    @cached_property
+    def _corners(self) -> NDArray[np.int32]:
+        """Of the tetrahedra (t, 4) between the points."""
+        return tetrahedralize(self.out_of_rows(self.around)) if self._mesh is None else self._mesh.simplices
+
+    @cached_property
+    def _shapes(self) -> AlphaShapes:
+        return AlphaShapes(self.around.points, self._corners)
+
+    @cached_property
+    def _reached(self) -> list[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
+        """Radii (n,) of each ball, and the tetrahedra (t,) that it gets to."""
+        nearest = self.around.distance[:, 1]
+        ball = (WIDE + WIDER * float(nearest.std() / nearest.mean())) * self.around.spacing
+        return [(widening * ball, self._shapes.outside(widening * ball)) for widening in WIDENED]
+
+    def _in_front(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether tetrahedra lie in front of each of their corners (t, 4)."""
+        points = self.around.points
+        centre = points[self._corners].mean(axis=1)
+        sides = [np.einsum("nd,nd->n", centre - points[corner], normals[corner]) > 0 for corner in self._corners.T]
+        return np.stack(sides, axis=1)
+
+    def _share(self, there: NDArray[np.bool_], chosen: NDArray[np.bool_], beyond: float) -> NDArray[np.float64]:
+        """Share (n,) of the tetrahedra that lie `there` (t, 4) of each point that are chosen (t,)."""
+        count = np.bincount(self._corners[there], minlength=len(self.around))
+        found = np.bincount(self._corners[there & chosen[:, None]], minlength=len(self.around))
+        # Beyond the hull there are none.
+        return np.where(count > 0, found / np.maximum(count, 1), beyond)
+
+    def _best(
+        self, in_front: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+        """Ball that tells most, what it reaches, and what that says (n,) of normals."""
+        says = [self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0) for _, free in self._reached]
+        best = int(np.argmax([np.abs(of).mean() for of in says]))
+        return *self._reached[best], says[best]
+
+    def evidence(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Tell how far free space gets to each point on the side that its normal points to, and to the other not.
+
+        Parameters
+        ----------
+        normals : (n, 3) float64
+
+        Returns
+        -------
+        (n,) float64
+            Share of the tetrahedra in front of a point that are reached, less that of those behind it: 1 where the
+            normal is right for certain, -1 where it is wrong, 0 where both sides are alike.
+        """
+        return self._best(self._in_front(normals))[2]
+
+    def sealed_behind(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points (n,) have space behind them that is wide, and that free space does not get to from outside.
+
+        Matter is, and so is the inside of a body within another. What faces it is the wall of a cavity.
+
+        Examples
+        --------
+        >>> from face_plugin.shapes import sphere
+        >>> ball = sphere(500)
+        >>> reach = Reach(Neighbourhood(ball.points))
+        >>> bool(reach.sealed_behind(ball.normals).mean() > 0.9), bool(reach.sealed_behind(-ball.normals).any())
+        (True, False)
+        """
+        in_front = self._in_front(normals)
+        ball, reached, _ = self._best(in_front)
+        sealed = self._shapes.roomy(ROOMY * ball) & ~reached
+        return self._share(~in_front, sealed, 0.0) > 0.5
+
+    @classmethod
+    def places(
+        cls, around: Neighbourhood, normals: NDArray[np.float64], places: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Which places (k, 3) free space gets to from outside, past points with these normals (n, 3).
+
+        Examples
+        --------
+        >>> from face_plugin.shapes import cup
+        >>> mug = cup(3000)
+        >>> places = np.array([[0.0, 0.0, 0.7], [0.0, 0.0, 0.95], [0.55, 0.0, 0.3]])
+        >>> Reach.places(Neighbourhood(mug.points), mug.normals, places).tolist()
+        [True, True, False]
+        """
+        mesh = Delaunay(cls.out_of_rows(around))
+        reach = cls(around, mesh)
+        reached = reach._best(reach._in_front(normals))[1]
+        at = mesh.find_simplex(places)
+        return np.asarray((at < 0) | reached[at])
+
+
+def out_of_reach(reach: Reach, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Find patches to turn (n,): what lies behind them is reached from outside, and what lies in front is not.
 
     Looked for only where the winding number says that something is inside out, and is more than a crease.
 
     Parameters
     ----------
-    around : Neighbourhood
+    reach : Reach
         Of n points.
     normals : (n, 3) float64
         Unit normals.
@@ -64,17 +189,18 @@ def out_of_reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray
     >>> mug = cup(3000)
     >>> inner = np.einsum("nd,nd->n", mug.points * [1, 1, 0], mug.normals) < -0.1
     >>> wrong = np.where(inner[:, None], -mug.normals, mug.normals)
-    >>> turned = out_of_reach(Neighbourhood(mug.points), wrong)
+    >>> turned = out_of_reach(Reach(Neighbourhood(mug.points)), wrong)
     >>> bool((turned == inner).mean() > 0.99)
     True
     """
+    around = reach.around
     found = np.zeros(len(around), dtype=np.bool_)
     edges = neighbours_around(around, normals)
     off = np.abs(winding_number(around, normals) - 0.5)
     # In a sharp crease the number is off as well, along a line of points; a line across the cloud has the root of n.
     if connected_parts(off > INSIDE_OUT, edges, max(SMALLEST, math.isqrt(len(around))))[1] == 0:
         return found
-    reached = reach(around, normals)
+    reached = reach.evidence(normals)
     coupling = couplings(around.points, normals, edges)
     sign = where_better(cluster_signs(len(around), edges, coupling, CERTAIN * reached), edges, coupling, reached)
     # Less than a patch is a point deep in the band in which points scatter.
@@ -86,116 +212,3 @@ def out_of_reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray
     )
     found[turned] = ((inside_out >= SMALLEST) & (after < FITS * before))[patch[turned]]
     return found
-
-
-def reach(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Tell how far free space gets to each point on the side that its normal points to, and to the other not.
-
-    Parameters
-    ----------
-    around : Neighbourhood
-        Of n points.
-    normals : (n, 3) float64
-
-    Returns
-    -------
-    (n,) float64
-        Share of the tetrahedra in front of a point that are reached, less that of those behind it: 1 where the normal
-        is right for certain, -1 where it is wrong, 0 where both sides are alike.
-
-    Examples
-    --------
-    >>> from face_plugin.shapes import sphere
-    >>> ball = sphere(500)
-    >>> around = Neighbourhood(ball.points)
-    >>> bool(reach(around, ball.normals).mean() > 0.9), bool(reach(around, -ball.normals).mean() < -0.9)
-    (True, True)
-    """
-    return _reached(around, normals, tetrahedralize(_out_of_rows(around)))[1]
-
-
-def sealed_behind(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which points (n,) have space behind them that is wide, and that free space does not get to from outside.
-
-    Matter is, and so is the inside of a body within another. What faces it is the wall of a cavity.
-
-    Examples
-    --------
-    >>> from face_plugin.shapes import sphere
-    >>> ball = sphere(500)
-    >>> around = Neighbourhood(ball.points)
-    >>> bool(sealed_behind(around, ball.normals).mean() > 0.9), bool(sealed_behind(around, -ball.normals).any())
-    (True, False)
-    """
-    corners = tetrahedralize(_out_of_rows(around))
-    reached, _, roomy = _reached(around, normals, corners)
-    behind = ~_in_front(around.points, normals, corners)
-    count = np.bincount(corners[behind], minlength=len(around))
-    sealed = np.bincount(corners[behind & (roomy & ~reached)[:, None]], minlength=len(around))
-    return np.asarray(2 * sealed > count)
-
-
-def reached_places(
-    around: Neighbourhood, normals: NDArray[np.float64], places: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Which places (k, 3) free space gets to from outside, past points with these normals (n, 3).
-
-    Examples
-    --------
-    >>> from face_plugin.shapes import cup
-    >>> mug = cup(3000)
-    >>> places = np.array([[0.0, 0.0, 0.7], [0.0, 0.0, 0.95], [0.55, 0.0, 0.3]])
-    >>> reached_places(Neighbourhood(mug.points), mug.normals, places).tolist()
-    [True, True, False]
-    """
-    mesh = Delaunay(_out_of_rows(around))
-    reached, _, _ = _reached(around, normals, mesh.simplices)
-    at = mesh.find_simplex(places)
-    return np.asarray((at < 0) | reached[at])
-
-
-def _reached(
-    around: Neighbourhood, normals: NDArray[np.float64], corners: NDArray[np.int32]
-) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.bool_]]:
-    """Tetrahedra (t,) that are reached, what `reach` returns, and tetrahedra that a larger one fits into.
-
-    A single gap of the sampling lets a ball in, and then all is reached; a ball that is too wide gets into no cavity.
-    That ball is taken that leaves most points with free space on one side alone.
-    """
-    nearest = around.distance[:, 1]
-    ball = (WIDE + WIDER * float(nearest.std() / nearest.mean())) * around.spacing
-    shapes, in_front = AlphaShapes(around.points, corners), _in_front(around.points, normals, corners)
-    tried = []
-    for widening in WIDENED:
-        reached = shapes.outside(widening * ball)
-        tried.append(
-            (reached, _evidence(len(around), corners, in_front, reached), shapes.roomy(ROOMY * widening * ball))
-        )
-    return max(tried, key=lambda found: float(np.abs(found[1]).mean()))
-
-
-def _in_front(
-    points: NDArray[np.float64], normals: NDArray[np.float64], corners: NDArray[np.int32]
-) -> NDArray[np.bool_]:
-    """Whether tetrahedra lie in front of each of their corners (t, 4)."""
-    centre = points[corners].mean(axis=1)
-    sides = [np.einsum("nd,nd->n", centre - points[corner], normals[corner]) > 0 for corner in corners.T]
-    return np.stack(sides, axis=1)
-
-
-def _evidence(
-    size: int, corners: NDArray[np.int32], in_front: NDArray[np.bool_], reached: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Share (n,) of the tetrahedra in front of each point that are reached, less that of those behind it."""
-    share = []
-    for there in (in_front, ~in_front):
-        count = np.bincount(corners[there], minlength=size)
-        free = np.bincount(corners[there & reached[:, None]], minlength=size)
-        # Beyond the hull there are none.
-        share.append(np.where(count > 0, free / np.maximum(count, 1), 1.0))
-    return np.asarray(share[0] - share[1])
-
-
-def _out_of_rows(around: Neighbourhood) -> NDArray[np.float64]:
-    moved = np.random.default_rng(0).uniform(-OUT_OF_ROWS, OUT_OF_ROWS, around.points.shape)
-    return np.asarray(around.points + moved * around.spacing[:, None])

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.compiled import compiled
-from face_plugin.geometry import plane_fit, ramp, thin
+from face_plugin.geometry import ramp, thin
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.threads import KDTree
+from face_plugin.planes import covariances, plane_fit
+from face_plugin.threads import KDTree, in_threads
 
 __all__ = ["Sheets", "back_to_back", "bulk", "cage_separation", "find_sheets", "next_sheet"]
 
@@ -64,9 +65,8 @@ def bulk(points: NDArray[np.float64], neighbour: NDArray[np.intp]) -> NDArray[np
     >>> float(bulk(sheet, KDTree(sheet).query(sheet, k=13)[1]).max())
     0.0
     """
-    near = points[neighbour[:, : BULK_NEIGHBOURS + 1]]
-    offset = near - near.mean(axis=1, keepdims=True)
-    low, middle = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", offset, offset)).T[:2]
+    near = neighbour[:, : BULK_NEIGHBOURS + 1]
+    low, middle = np.linalg.eigvalsh(covariances(points, near, np.ones(near.shape))).T[:2]
     # Points on one line have no extent in either direction: as far from a sheet as can be.
     return np.asarray(np.where(middle > 0, np.maximum(low, 0.0) / np.where(middle > 0, middle, 1.0), 1.0))
 
@@ -113,22 +113,39 @@ def back_to_back(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray
     lies behind them. Where points scatter about one sheet, few face the other way, and as many in front as behind. A
     point belongs to a plate where most of its neighbours have this pattern, so that a plate's rim does, too.
     """
-    points = around.points
-    near = around.neighbour[:, 1 : PLATE_NEIGHBOURS + 1]
-    facing = np.einsum("nkd,nd->nk", normals[near], normals)
-    offset = points[near] - points[:, None]
-    depth = -np.einsum("nkd,nd->nk", offset, normals)
-    behind = (depth > 0) & (np.einsum("nkd,nkd->nk", offset, normals[near]) > 0)
-    behind &= depth < PLATE_THICKNESS * around.spacing[:, None]
-    opposite = facing < -SAME_LINE
-    count = opposite.sum(axis=1)
-    parallel = (np.abs(facing) > SAME_LINE).mean(axis=1)
-    pattern = (
-        (count >= PLATE_SHARE * near.shape[1])
-        & ((opposite & behind).sum(axis=1) >= PLATE_BEHIND * count)
-        & (parallel > PLATE_PARALLEL)
-    )
+    pattern = np.empty(len(around), dtype=np.bool_)
+    near = np.ascontiguousarray(around.neighbour[:, 1 : PLATE_NEIGHBOURS + 1])
+    points, normals = around.points, np.ascontiguousarray(normals)
+    thick = PLATE_THICKNESS * around.spacing
+
+    def run(rows: slice) -> None:
+        _in_pattern(rows.start, rows.stop, points, normals, near, thick, pattern)
+
+    in_threads(run, len(around))
     return np.asarray(pattern[near].mean(axis=1) > PLATE_MAJORITY)
+
+
+@compiled(nogil=True)
+def _in_pattern(first, last, points, normals, near, thick, pattern):  # type: ignore[no-untyped-def]
+    for i in range(first, last):
+        opposite, behind, parallel = 0, 0, 0
+        for k in range(near.shape[1]):
+            j = near[i, k]
+            facing, depth, height = 0.0, 0.0, 0.0
+            for d in range(3):
+                offset = points[j, d] - points[i, d]
+                facing += normals[j, d] * normals[i, d]
+                depth -= offset * normals[i, d]
+                height += offset * normals[j, d]
+            parallel += abs(facing) > SAME_LINE
+            if facing < -SAME_LINE:
+                opposite += 1
+                behind += 0.0 < depth < thick[i] and height > 0.0
+        pattern[i] = (
+            opposite >= PLATE_SHARE * near.shape[1]
+            and behind >= PLATE_BEHIND * opposite
+            and parallel > PLATE_PARALLEL * near.shape[1]
+        )
 
 
 @dataclass(frozen=True)

@@ -59,24 +59,26 @@ def turn_sides(
     spacing = around.spacing
     flat = 1.0 - ramp(sheets.bulk, SHEET)
     low, high = SIDE_BOUNDS[0] * spacing, SIDE_BOUNDS[1] * spacing
-    narrow = np.clip(SIDE_WIDTH * sheets.near, low, high)
+    narrow = np.clip(SIDE_WIDTH * sheets.near, low, high) ** (1.0 - flat)
     wide = np.maximum(SIDE_WIDTH * sheets.far, low)
     vote = VOTE * ramp(sheets.bulk, NO_SHEET) * log_ramp(strength, STANDING_OUT)
     vote = vote[:, None] * rough
-    normals = rough
-    turning = ~kept
+    normals, turning = rough, np.flatnonzero(~kept)
     for step in range(SIDE_STEPS):
+        if len(turning) == 0:
+            break
         bound = WIDEST_KERNEL * (SIDE_BOUNDS[1] / WIDEST_KERNEL) ** (step / SIDE_STEPS)
-        width = narrow ** (1.0 - flat) * np.minimum(wide, bound * spacing) ** flat
-        width[~turning] = 0.0
+        width = np.zeros(len(around))
+        width[turning] = narrow[turning] * np.minimum(wide, bound * spacing)[turning] ** flat[turning]
         # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
         outward, number = around.tree.outward_and_number(normals, width, SIDE_OPENING)
-        jump = outward * (width / (2.0 * np.pi))[:, None]
-        turned = np.where(turning[:, None], unit(jump + vote), normals)
+        jump = outward[turning] * (width[turning] / (2.0 * np.pi))[:, None]
+        turned = normals.copy()
+        turned[turning] = unit(jump + vote[turning])
         if step + 1 == FORGET_AFTER:
-            turned[~kept & (strength < FORGET_DARK) & (number > FORGET_ENCLOSED)] = 0.0
+            turned[turning[(strength < FORGET_DARK)[turning] & (number > FORGET_ENCLOSED)[turning]]] = 0.0
         if step + 1 >= FORGET_AFTER:
             moved = np.einsum("nd,nd->n", turned, normals) < np.cos(SETTLED)
-            turning = moved[around.neighbour[:, : SETTLED_AROUND + 1]].any(axis=1) & ~kept
+            turning = np.flatnonzero(moved[around.neighbour[:, : SETTLED_AROUND + 1]].any(axis=1) & ~kept)
         normals = turned
     return normals

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin import cloud
+from face_plugin.medians import medians
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.sheets import BULK_NEIGHBOURS, bulk
 from face_plugin.threads import KDTree
@@ -39,14 +40,14 @@ def find_strays(around: Neighbourhood) -> NDArray[np.bool_]:
     >>> np.flatnonzero(find_strays(Neighbourhood(points)))
     array([500, 501])
     """
-    typical = np.median(around.spacing[around.neighbour[:, 1:]], axis=1)
+    typical = medians(around.spacing, around.neighbour[:, 1:])
     lonely = around.spacing > (LONELY_ON_CURVE if around.plane else LONELY) * typical
     rows = np.flatnonzero(lonely)
     if len(rows) > BULK_NEIGHBOURS:
         # A sparse sheet beside a dense one: its points are lonely there, and near one another.
         among = Neighbourhood(around.points[rows])
         nearest = among.neighbour[:, : BULK_NEIGHBOURS + 1]
-        flat = np.median(bulk(among.points, among.neighbour)[nearest], axis=1) < SHEET
+        flat = medians(bulk(among.points, among.neighbour), nearest) < SHEET
         lonely[rows[flat & (among.spacing < LONELY * around.spacing[rows])]] = False
     # What is left must have something to be a stray of: not a few points, nor points on a line.
     rest = around.points[~lonely]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from face_plugin.faraday.locate import Locator
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.solve import solve_cage
+from face_plugin.geometry import thin
 from face_plugin.io.disk import naming
 from face_plugin.params import Params
 
@@ -160,5 +161,5 @@ def solve_coarse(voxels: Voxels, params: Params, memory: float | None = None) ->
     # Neighbouring voxels may hold points that nearly touch: their balls would be small and the gaps beside
     # them wide.
     separation = np.full(len(voxels.points), VOXELS_APART * voxels.size)
-    cage = solve_cage(voxels.points, separation, params, memory=memory)
+    cage = solve_cage(voxels.points, thin(voxels.points, separation, params.seed), params, memory=memory)
     return Coarse(cage.mesh, cage.potential, cage.cage_value, Locator(cage.mesh))

@@ -21,6 +21,7 @@ from typing import Any
 
 from face_plugin.errors import FaceError
 from face_plugin.execution import Engine, Job
+from face_plugin.threads import one_core
 from face_plugin.tiles.tile import warm_up
 
 __all__ = ["Engine", "Job", "Processes", "Serial"]
@@ -129,7 +130,7 @@ class Processes:
         self._pool = ProcessPoolExecutor(
             count,
             mp_context=multiprocessing.get_context("fork" if forks else "spawn"),
-            initializer=_follow_parent,
+            initializer=_begin_worker,
         )
         # What is not loaded yet, they load while this process prepares the tiles.
         with nullcontext() if forks else _without_main():
@@ -160,6 +161,11 @@ def _may_fork() -> bool:
         return len(os.listdir("/proc/self/task")) == 1
     except OSError:
         return False
+
+
+def _begin_worker() -> None:
+    one_core()
+    _follow_parent()
 
 
 def _follow_parent() -> None:

@@ -13,7 +13,7 @@ from face_plugin.app.plot.figures import Array, Matplotlib, new_figure, show, sp
 from face_plugin.app.plot.render import Camera, Up, View, render_mesh
 from face_plugin.app.plot.section import Section
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.reach import reached_places
+from face_plugin.sides.reach import Reach
 
 __all__ = ["plot_interior", "space_reached"]
 
@@ -42,7 +42,7 @@ def space_reached(points: ArrayLike, normals: ArrayLike) -> Callable[[Array], ND
     some = np.arange(len(rows))
     if len(rows) > MOST:
         some = np.random.default_rng(0).choice(len(rows), MOST, replace=False)
-    return partial(reached_places, Neighbourhood(distinct[some]), np.asarray(normals, dtype=np.float64)[rows[some]])
+    return partial(Reach.places, Neighbourhood(distinct[some]), np.asarray(normals, dtype=np.float64)[rows[some]])
 
 
 def plot_interior(

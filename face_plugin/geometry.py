@@ -95,21 +95,18 @@ def thin(
     # A point exactly as far away as the separation is far enough, whatever rounding says.
     within = separation * (1 - 1e-12)
     if found is None:
-        tree = KDTree(points)
-        beyond = np.flatnonzero(tree.query(points, k=2)[0][:, 1] < separation)
-        distance, neighbour = np.empty((len(points), 0)), np.empty((len(points), 0), dtype=np.intp)
+        beyond = np.flatnonzero(KDTree(points).query(points, k=2)[0][:, 1] < separation)
+        found = np.empty((len(points), 0)), np.empty((len(points), 0), dtype=np.intp)
     else:
-        distance, neighbour = (np.ascontiguousarray(of) for of in found)
-        beyond = np.flatnonzero((distance[:, -1] <= within) & (distance.shape[1] < len(points)))
-        tree = KDTree(points) if len(beyond) else None
+        beyond = np.flatnonzero((found[0][:, -1] <= within) & (found[0].shape[1] < len(points)))
     start, others = np.zeros(len(points) + 1, dtype=np.int64), np.empty(0, dtype=np.int64)
-    if tree is not None and len(beyond):
-        lists = tree.within(points[beyond], within[beyond])
+    if len(beyond):
+        lists = KDTree(points).within(points[beyond], within[beyond])
         start[beyond + 1] = [len(x) for x in lists]
         np.cumsum(start, out=start)
         others = np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])
     taken = np.zeros(len(points), dtype=np.bool_)
-    _greedy(order, within, distance, neighbour, start, others, taken)
+    _greedy(order, within, *map(np.ascontiguousarray, found), start, others, taken)
     return np.flatnonzero(taken)
 
 

@@ -84,9 +84,7 @@ def solve_field(
     # The neighbours take a tenth of the memory of what follows: who needs them no more need not hold them.
     del around
     # Balls (3.1), the box around them, the mesh between, and the potential of three basis fields (3.2).
-    cage = solve_cage(
-        points, rows, params, box=box, given=given, cage_value=cage_value, memory=memory, stage=stage
-    )
+    cage = solve_cage(points, rows, params, box=box, given=given, cage_value=cage_value, memory=memory, stage=stage)
     # The greatest strength that an external field of any direction causes (3.3).
     with stage("field"):
         strength = field.strength(cage.mesh, cage.potential, params.directions)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from face_plugin.threads import KDTree
+from face_plugin.tree import PointTree
 from face_plugin.winding import DipoleTree
 from face_plugin.winding_plane import PlaneTree
 
@@ -44,9 +44,12 @@ class Neighbourhood:
         return bool(self.points.shape[1] == 2)
 
     @cached_property
+    def _halved(self) -> PointTree:
+        return PointTree(self.points)
+
+    @cached_property
     def _found(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        found = KDTree(self.points).query(self.points, k=min(NEIGHBOURS + 1, len(self.points)))
-        return np.asarray(found[0]), np.asarray(found[1])
+        return self._halved.nearest(min(NEIGHBOURS + 1, len(self.points)))
 
     @property
     def distance(self) -> NDArray[np.float64]:
@@ -69,5 +72,5 @@ class Neighbourhood:
         if self.plane:
             # Within the distance to the last of the 6 nearest there is twice that of curve, however points are spread.
             count = min(SPACING_NEIGHBOURS, self.distance.shape[1] - 1)
-            return PlaneTree(self.points, 2.0 / count * self.distance[:, count])
-        return DipoleTree(self.points, self.spacing**2)
+            return PlaneTree(self._halved, 2.0 / count * self.distance[:, count])
+        return DipoleTree(self._halved, self.spacing**2)

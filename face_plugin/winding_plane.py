@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from face_plugin.compiled import compiled
 from face_plugin.threads import in_threads
-from face_plugin.winding import STACK, DipoleTree
+from face_plugin.tree import STACK, PointTree
+from face_plugin.winding import DipoleTree
 
 __all__ = ["PlaneTree"]
 
@@ -26,7 +27,7 @@ class PlaneTree(DipoleTree):
 
     Parameters
     ----------
-    points : (n, 2) float64
+    points : (n, 2) float64 or PointTree
     lengths : (n,) float64, in the unit of the points
 
     Examples
@@ -38,12 +39,9 @@ class PlaneTree(DipoleTree):
     array([1., 0.])
     """
 
-    def __init__(self, points: NDArray[np.float64], lengths: NDArray[np.float64]) -> None:
-        super().__init__(np.column_stack([points, np.zeros(len(points))]), lengths)
-
     def _add_sums(
         self,
-        queries: NDArray[np.float64],
+        queries: PointTree,
         themselves: bool,
         dipoles: NDArray[np.float64],
         eps: NDArray[np.float64],
@@ -51,13 +49,15 @@ class PlaneTree(DipoleTree):
         opening: float,
         out: NDArray[np.float64],
     ) -> None:
+        tree = self._tree
+
         def run(rows: slice) -> None:
             _sums(
-                rows.start, rows.stop, queries, themselves, self._points, dipoles, eps, self._start, self._stop,
-                self._child, self._centre, self._radius, moments, opening, np.empty(STACK, dtype=np.int64), out,
+                rows.start, rows.stop, queries.points, themselves, tree.points, dipoles, eps, tree.start, tree.stop,
+                tree.child, self._centre, self._radius, moments, opening, np.empty(STACK, dtype=np.int64), out,
             )  # fmt: skip
 
-        in_threads(run, len(queries))
+        in_threads(run, len(queries.points))
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -12,7 +12,6 @@ from face_plugin.angles.fits import fit_surfaces
 from face_plugin.angles.noise import find_noise
 from face_plugin.angles.turning import turn_angles
 from face_plugin.geometry import unit
-
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.planes import plane_fit
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from face_plugin.angles.fits import SIZES, fit_surfaces
-
+from face_plugin.planes import plane_fit
 
 
 def patch(height, count=400, seed=0):

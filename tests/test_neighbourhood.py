@@ -1,7 +1,6 @@
 """What is near each point: right, and found once for all steps."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from face_plugin import FaCE, neighbourhood, shapes
 from face_plugin.geometry import local_spacing
@@ -25,17 +24,17 @@ def test_few_points_have_fewer_neighbours():
 def test_a_cloud_is_searched_once_for_all_steps(monkeypatch):
     searched, planted = [], []
 
-    class Tree(cKDTree):
-        def __init__(self, points):
-            searched.append(len(points))
-            super().__init__(points)
+    class Tree(neighbourhood.PointTree):
+        def nearest(self, count):
+            searched.append(len(self.points))
+            return super().nearest(count)
 
     class Dipoles(neighbourhood.DipoleTree):
-        def __init__(self, points, areas):
-            planted.append(len(points))
-            super().__init__(points, areas)
+        def __init__(self, tree, areas):
+            planted.append(len(areas))
+            super().__init__(tree, areas)
 
-    monkeypatch.setattr(neighbourhood, "KDTree", Tree)
+    monkeypatch.setattr(neighbourhood, "PointTree", Tree)
     monkeypatch.setattr(neighbourhood, "DipoleTree", Dipoles)
     FaCE(BALL.points).result(filter_interior=True)
     # The second search is among the few points that show sheets far away.

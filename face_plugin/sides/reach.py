@@ -109,9 +109,7 @@ class Reach:
         # Beyond the hull there are none.
         return np.where(count > 0, found / np.maximum(count, 1), beyond)
 
-    def _best(
-        self, in_front: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+    def _best(self, in_front: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
         """Ball that tells most, what it reaches, and what that says (n,) of normals."""
         says = [self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0) for _, free in self._reached]
         best = int(np.argmax([np.abs(of).mean() for of in says]))

@@ -111,10 +111,12 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         coarse = _coarse(store.folder, store.key)
         part = surroundings(store, tile, HALO)
         own = part.points[part.own]
-        stray = find_strays(Neighbourhood(part.points))
-        sound = part.points[~stray]
+        around = Neighbourhood(part.points)
+        stray = find_strays(around)
+        if stray.any():
+            around = Neighbourhood(part.points[~stray])
     solved = solve_field(
-        Neighbourhood(sound),
+        around,
         params,
         store.frame.scale,
         box=_box(part, params),
@@ -127,7 +129,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
     with clock("field"):
         if store.refines:
             # The second stage needs them as well, and to look for them is a fifth of all work.
-            sheets = solved.sheets or find_sheets(Neighbourhood(sound))
+            sheets = solved.sheets or find_sheets(around)
             place = np.maximum(np.cumsum(~stray) - 1, 0)[part.own]
             found = {name: values[place] for name, values in vars(sheets).items()}
         if store.interior:

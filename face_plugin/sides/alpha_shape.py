@@ -34,24 +34,29 @@ class AlphaShapes:
 
     def __init__(self, points: NDArray[np.float64], corners: NDArray[np.int32]) -> None:
         outside, size = len(corners), len(points)
-        facet = np.sort(np.concatenate([np.delete(corners, k, axis=1) for k in range(4)]).astype(np.int64), axis=1)
-        of, apex = np.tile(np.arange(outside), 4), corners.T.ravel()
+        ordered = np.sort(corners, axis=1).astype(np.int64).T
+        facet = np.concatenate([np.delete(ordered, k, axis=0) for k in range(4)], axis=1)
+        of, apex = np.tile(np.arange(outside), 4), ordered.ravel()
         # Equal facets stand side by side then.
-        order = np.lexsort((facet[:, 2], facet[:, 0] * size + facet[:, 1]))
-        facet, of, apex = facet[order], of[order], apex[order]
-        same = np.append((facet[1:] == facet[:-1]).all(axis=1), False)
+        first_two = facet[0] * size + facet[1]
+        key = first_two * size + facet[2]
+        order = np.argsort(key) if size**3 < 2**63 else np.lexsort((facet[2], first_two))
+        key, of, apex = key[order], of[order], apex[order]
+        same = np.append(key[1:] == key[:-1], False)
         first = np.flatnonzero(~np.roll(same, 1))
         beyond = np.where(same, np.roll(of, -1), outside)[first]
         # A facet of the hull has one tetrahedron, whose corner stands for both.
-        apex = np.stack([apex, np.where(same, np.roll(apex, -1), apex)])[:, first]
-        facet, of = facet[first], of[first]
+        apexes = apex[first], np.where(same, np.roll(apex, -1), apex)[first]
+        facet, of, at = facet[:, order[first]], of[first], np.ascontiguousarray(points.T)
         # The sphere around a flat tetrahedron is as wide as numbers go.
         with np.errstate(over="ignore"):
-            centre, circle = _circles(*(points[facet[:, k]] for k in range(3)))
-            held = (np.linalg.norm(points[apex] - centre, axis=2) < circle).any(axis=0)
-            sphere = np.append(_spheres(*(points[corners[:, k]] for k in range(4))), np.inf)
+            centre, circle = _circles(*(at[:, corner] for corner in facet))
+            held = np.zeros(len(of), dtype=np.bool_)
+            for one in apexes:
+                held |= _length(at[:, one] - centre) < circle
+            sphere = np.append(_spheres(*(at[:, corner] for corner in ordered)), np.inf)
         self._facet, self._of, self._beyond, self._count = facet, of, beyond, outside
-        self._corners, self._sphere = corners, sphere[:-1]
+        self._corners, self._sphere = ordered, sphere[:-1]
         self._passes = np.where(held, np.minimum(sphere[of], sphere[beyond]), circle)
 
     def outside(self, radius: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -62,7 +67,7 @@ class AlphaShapes:
         radius : (n,) float64
             Of the ball, at each point; its mean over a facet's corners counts.
         """
-        through = self._passes > radius[self._facet].mean(axis=1)
+        through = self._passes > _mean(radius, self._facet)
         size = self._count + 1
         link = coo_matrix((np.ones(through.sum()), (self._of[through], self._beyond[through])), shape=(size, size))
         label = connected_components(link, directed=False)[1]
@@ -70,29 +75,45 @@ class AlphaShapes:
 
     def roomy(self, radius: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which tetrahedra (t,) the ball fits between the points of; `radius` as of `outside`."""
-        return np.asarray(self._sphere > radius[self._corners].mean(axis=1))
+        return np.asarray(self._sphere > _mean(radius, self._corners))
+
+
+def _mean(values: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Mean (k,) of the values (n,) at some rows (c, k) each."""
+    total = values[rows[0]]
+    for row in rows[1:]:
+        total = total + values[row]
+    return np.asarray(total / len(rows))
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _length(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(_dot(a, a)))
 
 
 def _circles(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres (k, 3) and radii (k,) of the circles through three points (k, 3) each."""
+    """Centres (3, k) and radii (k,) of the circles through three points (3, k) each."""
     u, v = b - a, c - a
-    n = np.cross(u, v)
-    uu, vv, nn = (np.einsum("kd,kd->k", x, x)[:, None] for x in (u, v, n))
-    offset = (np.cross(n, u) * vv + np.cross(v, n) * uu) / np.maximum(2.0 * nn, np.finfo(float).tiny)
-    return a + offset, np.linalg.norm(offset, axis=1)
+    n = _cross(u, v)
+    offset = _cross(n, u) * _dot(v, v) + _cross(v, n) * _dot(u, u)
+    offset /= np.maximum(2.0 * _dot(n, n), np.finfo(float).tiny)
+    return a + offset, _length(offset)
 
 
 def _spheres(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Radii (k,) of the spheres through four points (k, 3) each."""
+    """Radii (k,) of the spheres through four points (3, k) each."""
     u, v, w = b - a, c - a, d - a
-    uu, vv, ww = (np.einsum("kd,kd->k", x, x)[:, None] for x in (u, v, w))
-    across = np.cross(v, w)
-    offset = uu * across + vv * np.cross(w, u) + ww * np.cross(u, v)
-    return np.asarray(
-        np.linalg.norm(offset, axis=1)
-        / np.maximum(2.0 * np.abs(np.einsum("kd,kd->k", u, across)), np.finfo(float).tiny)
-    )
+    across = _cross(v, w)
+    offset = _dot(u, u) * across + _dot(v, v) * _cross(w, u) + _dot(w, w) * _cross(u, v)
+    return np.asarray(_length(offset) / np.maximum(2.0 * np.abs(_dot(u, across)), np.finfo(float).tiny))

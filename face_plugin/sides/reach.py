@@ -97,9 +97,12 @@ class Reach:
 
     def _in_front(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether tetrahedra lie in front of each of their corners (t, 4)."""
+        # Their middle c lies in front of a corner p: 4 n . (c - p) = n . (sum of corners - 4 p).
         points = self.around.points
-        centre = points[self._corners].mean(axis=1)
-        sides = [np.einsum("nd,nd->n", centre - points[corner], normals[corner]) > 0 for corner in self._corners.T]
+        total = points[self._corners[:, 0]] + points[self._corners[:, 1]]
+        total += points[self._corners[:, 2]] + points[self._corners[:, 3]]
+        height = 4.0 * np.einsum("nd,nd->n", points, normals)
+        sides = [np.einsum("nd,nd->n", total, normals[corner]) > height[corner] for corner in self._corners.T]
         return np.stack(sides, axis=1)
 
     def _share(self, there: NDArray[np.bool_], chosen: NDArray[np.bool_], beyond: float) -> NDArray[np.float64]:

@@ -79,6 +79,9 @@ def turn_sides(
             turned[turning[(strength < FORGET_DARK)[turning] & (number > FORGET_ENCLOSED)[turning]]] = 0.0
         if step + 1 >= FORGET_AFTER:
             moved = np.einsum("nd,nd->n", turned, normals) < np.cos(SETTLED)
-            turning = np.flatnonzero(moved[around.neighbour[:, : SETTLED_AROUND + 1]].any(axis=1) & ~kept)
+            near = moved.copy()
+            for column in around.neighbour[:, 1 : SETTLED_AROUND + 1].T:
+                near |= moved[column]
+            turning = np.flatnonzero(near & ~kept)
         normals = turned
     return normals

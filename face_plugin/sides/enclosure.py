@@ -108,11 +108,15 @@ def enclosed(
             number = tree.number(outer, width)
     found = number > ENCLOSED
     rows = np.flatnonzero(found)
-    step_outward = points.copy()
-    band = np.where(_scatters(around, normals, rows), _band(around, normals, rows), 0.0)
-    step_outward[rows] += (STEP * spacing[rows] + band)[:, None] * normals[rows]
+    step = STEP * spacing[rows]
+    scattered = _scatters(around, normals, rows)
+    step[scattered] += _band(around, normals, rows[scattered])
     for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
-        found &= tree.number(dipoles, np.where(found, width, 0.0), step_outward) > level
+        if len(rows) == 0:
+            return found
+        still = tree.number(dipoles, width[rows], points[rows] + step[:, None] * normals[rows]) > level
+        found[rows] = still
+        rows, step = rows[still], step[still]
     # What lies inside is a surface of its own. Fewer points are the deepest of a noisy sheet, or of a narrow slot.
     joined = around.neighbour[:, 1 : JOINED + 1]
     edges = Edges(np.repeat(np.arange(len(points)), joined.shape[1]), joined.ravel())

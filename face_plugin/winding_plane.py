@@ -39,6 +39,9 @@ class PlaneTree(DipoleTree):
     array([1., 0.])
     """
 
+    def _moments(self, dipoles: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._tree.sums(dipoles)
+
     def _add_sums(
         self,
         queries: PointTree,

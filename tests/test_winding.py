@@ -8,7 +8,7 @@ import reference
 
 from face_plugin import shapes
 from face_plugin.geometry import unit
-from face_plugin.winding import OPENING, DipoleTree
+from face_plugin.winding import DipoleTree
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_the_gradient_and_the_number_come_together(cloud):
     tree = DipoleTree(points, areas)
     outward, number = tree.outward_and_number(normals, eps)
     assert np.array_equal(outward, tree.outward(normals, eps))
-    assert np.array_equal(number, tree.number(normals, eps, opening=OPENING))
+    assert np.array_equal(number, tree.number(normals, eps))
 
 
 def test_distance_and_scale_take_no_digits_away(cloud):

@@ -14,8 +14,6 @@ __all__ = ["level", "level_weight"]
 # Gradient steps, and their length: with more or longer ones angles get worse than the surface gets better.
 STEPS = 3
 RATE = 1.45
-# A small correction bears a coarse sum.
-OPENING = 0.6
 # Area of a point of an even sampling, in squares of the mean distance to its 6 nearest.
 AREA = 0.87
 # A point off the level by more than FARTHEST is no sample of one surface, and by more than FAR is as one off by FAR.
@@ -105,6 +103,6 @@ def level(
             weight = weight * (1.0 - ramp(typical, LEVEL)) * (width > 0)
             width = np.where(weight > 0, width, 0.0)
         charge = weight * np.where(np.abs(off) < FARTHEST, np.clip(off, -FAR, FAR), 0.0)
-        turn = [tree.number(np.outer(charge, axis), width, opening=OPENING) for axis in np.eye(3)]
+        turn = [tree.number(np.outer(charge, axis), width) for axis in np.eye(3)]
         normals = unit(normals + RATE * AREA * weight[:, None] * np.stack(turn, axis=1))
     return normals

@@ -23,8 +23,6 @@ __all__ = ["turn_sides"]
 SIDE_STEPS = 36
 SETTLED = 0.05
 SETTLED_AROUND = 8
-# The side bears a coarser sum than the angle: about twice as fast, one to two degrees off.
-SIDE_OPENING = 0.6
 SIDE_WIDTH = 0.3
 SIDE_BOUNDS = (0.3, 3.0)
 # On a sheet the kernel may reach farther, to strokes many spacings away: at first up to this many spacings, then less
@@ -71,7 +69,7 @@ def turn_sides(
         width = np.zeros(len(around))
         width[turning] = narrow[turning] * np.minimum(wide, bound * spacing)[turning] ** flat[turning]
         # In units of the jump across an infinite plane, 4 pi |grad w| = 2 pi / width.
-        outward, number = around.tree.outward_and_number(normals, width, SIDE_OPENING)
+        outward, number = around.tree.outward_and_number(normals, width)
         jump = outward[turning] * (width[turning] / (2.0 * np.pi))[:, None]
         turned = normals.copy()
         turned[turning] = unit(jump + vote[turning])

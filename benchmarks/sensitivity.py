@@ -18,6 +18,7 @@ import itertools
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -136,21 +137,24 @@ def measured(points: int) -> list[float]:
     return [float(x) for x in np.mean(found, axis=0)]
 
 
-def is_compiled_in(module: str, constant: str) -> bool:
-    """Whether the value may be part of compiled code, which Numba would take from its cache."""
+def compiled_with(module: str, constant: str) -> set[str]:
+    """Names of modules with compiled code that the value may be part of, which Numba would take from its cache."""
     sources = {path: path.read_text() for path in ROOT.rglob("*.py")}
     own = ROOT.joinpath(*module.split(".")[1:]).with_suffix(".py")
     taken = re.compile(rf"from {re.escape(module)} import [^\n]*\b{constant}\b")
-    return any("compiled" in text for path, text in sources.items() if path == own or taken.search(text))
+    return {p.stem for p, text in sources.items() if "@compiled" in text and (p == own or taken.search(text))}
 
 
-def run(points: int, change: tuple[str, str, object] | None) -> list[float]:
-    """Measure in a process of its own; what it compiles has the constant in it, and is not kept."""
+def run(points: int, change: tuple[str, str, object] | None, kept: str) -> list[float]:
+    """Measure in a process of its own; compiled code is that of a folder, but for what has the constant in it."""
     words = [sys.executable, __file__, "--points", str(points), "--change", json.dumps(change)]
-    with tempfile.TemporaryDirectory() as cache:
-        env = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-        if change is not None and is_compiled_in(change[0], change[1]):
-            env["NUMBA_CACHE_DIR"] = cache
+    anew = set() if change is None else compiled_with(change[0], change[1])
+    with tempfile.TemporaryDirectory() as own:
+        if anew:
+            left_out = shutil.ignore_patterns(*(f"{stem}.*" for stem in anew))
+            shutil.copytree(kept, own, dirs_exist_ok=True, ignore=left_out)
+        cache = own if anew else kept
+        env = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "NUMBA_CACHE_DIR": cache}
         done = subprocess.run(words, capture_output=True, text=True, env=env)
     return list(json.loads(done.stdout)) if done.returncode == 0 else [np.nan] * 3
 
@@ -170,14 +174,20 @@ def main() -> None:
             sys.meta_path.insert(0, Finder(module, constant, value))  # type: ignore[arg-type]
         print(json.dumps(measured(args.points)))
         return
+    found = {key: value for folder in args.modules for key, value in constants(folder).items()}
+    with tempfile.TemporaryDirectory() as kept:
+        report(found, args.points, args.workers, kept)
+
+
+def report(found: dict[tuple[str, str], object], points: int, workers: int, kept: str) -> None:
+    """Print the table; compiled code is kept in a folder."""
     import truth
 
-    found = {key: value for folder in args.modules for key, value in constants(folder).items()}
-    base = run(args.points, None)
+    base = run(points, None, kept)
     print(f"As it is: {base[0]:.2f} % wrong, {base[1]:.2f} degrees, {base[2]:.2f} % dropped.\n", flush=True)
     jobs = [(*key, changed(value, factor)) for (key, value), factor in itertools.product(found.items(), (0.5, 2.0))]
-    with ThreadPoolExecutor(args.workers) as threads:
-        outcomes = list(threads.map(lambda job: run(args.points, job), jobs))
+    with ThreadPoolExecutor(workers) as threads:
+        outcomes = list(threads.map(lambda job: run(points, job, kept), jobs))
     rows, calm = [], []
     for (key, value), half, double in zip(found.items(), outcomes[::2], outcomes[1::2], strict=True):
         name = f"{key[0].removeprefix('face_plugin.')}.{key[1]}"

@@ -45,7 +45,9 @@ class KDTree(cKDTree):  # type: ignore[misc]
     is free again, which ends the process by a signal.
     """
 
-    def query(self, x: NDArray[np.floating], k: int | list[int] = 1) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    def query(
+        self, x: NDArray[np.floating], k: int | list[int] = 1, bound: float = np.inf
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """Distances and rows of the nearest points, as of SciPy.
 
         Parameters
@@ -53,6 +55,8 @@ class KDTree(cKDTree):  # type: ignore[misc]
         x : (m, 3) float64
         k : int or list of int
             How many, or which of them counted from 1.
+        bound : float
+            Points as far away or farther do not count: where there are fewer, distances are infinite.
 
         Returns
         -------
@@ -67,7 +71,7 @@ class KDTree(cKDTree):  # type: ignore[misc]
         distance, row = np.empty(shape), np.empty(shape, dtype=np.intp)
 
         def run(rows: slice) -> None:
-            distance[rows], row[rows] = cKDTree.query(self, x[rows], k=k)
+            distance[rows], row[rows] = cKDTree.query(self, x[rows], k=k, distance_upper_bound=bound)
 
         in_threads(run, len(x))
         return distance, row

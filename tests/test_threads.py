@@ -56,3 +56,8 @@ print(caught)
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout == "8\n"
+
+
+def test_what_lies_beyond_the_bound_is_not_found():
+    distance, _ = KDTree(np.arange(4.0)[:, None] * np.ones((1, 3))).query(np.zeros((1, 3)), k=4, bound=2.0)
+    np.testing.assert_allclose(distance, [[0.0, np.sqrt(3.0), np.inf, np.inf]])

@@ -61,13 +61,13 @@ def visible(
     (True, False)
     """
     seen = (points != viewpoint).any(axis=1)
-    for blocker, gap in _in_the_way(points, points, spacing, viewpoint):
-        hidden = gap > BEHIND * np.maximum(spacing[:, None], spacing[blocker])
-        if hidden.any():
-            some = np.flatnonzero(hidden.any(axis=1))
-            off = np.abs(np.einsum("nkd,nd->nk", points[blocker[some]] - points[some, None], lines[some]))
-            hidden[some] &= off > IN_PLANE * np.maximum(spacing[some, None], spacing[blocker[some]])
-        seen &= ~hidden.any(axis=1)
+    for at, blocker, gap in _in_the_way(points, seen, points, spacing, viewpoint):
+        hidden = gap > BEHIND * np.maximum(spacing[at, None], spacing[blocker])
+        some = np.flatnonzero(hidden.any(axis=1))
+        at, blocker = at[some], blocker[some]
+        off = np.abs(np.einsum("nkd,nd->nk", points[blocker] - points[at, None], lines[at]))
+        over = off > IN_PLANE * np.maximum(spacing[at, None], spacing[blocker])
+        seen[at] = ~(hidden[some] & over).any(axis=1)
     return np.asarray(seen)
 
 
@@ -86,21 +86,23 @@ def lit(around: Neighbourhood, sensors: Sensors | None, places: NDArray[np.float
         return seen
     for view in _spread(_views(around.points, sensors)):
         free = np.ones(len(places), dtype=np.bool_)
-        for blocker, gap in _in_the_way(places, around.points, around.spacing, view):
-            free &= ~(gap > BEHIND * around.spacing[blocker]).any(axis=1)
+        for at, blocker, gap in _in_the_way(places, free, around.points, around.spacing, view):
+            free[at] = ~(gap > BEHIND * around.spacing[blocker]).any(axis=1)
         seen |= free
     return seen
 
 
 def _in_the_way(
     places: NDArray[np.float64],
+    free: NDArray[np.bool_],
     points: NDArray[np.float64],
     spacing: NDArray[np.float64],
     viewpoint: NDArray[np.float64],
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float64]]]:
-    """Yield points (k, j) in the direction of places (k, 3), and how much nearer (k, j) they are to the viewpoint.
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]]:
+    """Yield places (j,) that something may hide, points (j, c) in their direction, and how much nearer these are.
 
-    They are -inf nearer where they do not cover the place.
+    Nearer to the viewpoint, that is; -inf where they do not cover the place. Only places (k, 3) that are still `free`
+    (k,) by then are looked at.
     """
 
     def looked_at(these: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -116,12 +118,14 @@ def _in_the_way(
     octave = np.floor(np.log2(size))
     octave = np.clip(octave, octave.max() - OCTAVES, octave.max())
     for this in np.unique(octave):
-        rows = np.flatnonzero(octave == this)
+        rows, at = np.flatnonzero(octave == this), np.flatnonzero(free)
         count = min(LOOKED_AT, len(rows))
-        apart, near = KDTree(direction[rows]).query(ahead, k=count)
-        blocker = rows[near.reshape(len(places), count)]
-        covered = apart.reshape(len(places), count) < size[blocker]
-        yield blocker, np.where(covered, away[:, None] - distance[blocker], -np.inf)
+        # What lies beyond the largest of them covers nothing.
+        apart, near = KDTree(direction[rows]).query(ahead[at], k=count, bound=float(size[rows].max()))
+        apart, near = apart.reshape(len(at), count), near.reshape(len(at), count)
+        some = np.isfinite(apart).any(axis=1)
+        at, apart, blocker = at[some], apart[some], rows[np.minimum(near[some], len(rows) - 1)]
+        yield at, blocker, np.where(apart < size[blocker], away[at, None] - distance[blocker], -np.inf)
 
 
 def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) -> NDArray[np.float64]:

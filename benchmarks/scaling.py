@@ -138,8 +138,9 @@ def from_file(n: int, max_memory: float) -> str:
         with np.load(folder / "truth.npz") as arrays:
             right = np.einsum("ij,ij->i", normals, arrays["normals"])[~arrays["interior"]] > 0
     return (
-        f"{len(normals):,} points with --max-memory {max_memory}: {seconds:.0f} s on the clock, {spent:.0f} s of "
-        f"processors, {peaks['peak_gb']:.2f} GB at the peak of all processes, {100 * right.mean():.3f} % on the right side"
+        f"{len(normals):,} points with --max-memory {max_memory}: {seconds:.0f} s on the clock, {spent:.0f} s "
+        f"of processors, {peaks['peak_gb']:.2f} GB at the peak of all processes, "
+        f"{100 * right.mean():.3f} % on the right side"
     )
 
 

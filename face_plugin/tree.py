@@ -62,24 +62,29 @@ class PointTree:
         self.points = points[self.order]
         self.start, self.stop, self.child = _halves(len(points))
         self.groups = _groups(len(points))
+        self._parents = _by_level(self.child)
 
     def sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Add up (m, c) the values (n, c) of each node's points, which are in the order of the tree."""
-        running = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-        return np.asarray(running[self.stop] - running[self.start])
+        out = np.empty((len(self.start), values.shape[1]))
+        # Leaves from their points and parents from their children, as running sums lose what is small beside the rest.
+        leaf = np.flatnonzero(self.child < 0)
+        leaf = leaf[np.argsort(self.start[leaf])]
+        out[leaf] = np.add.reduceat(values, self.start[leaf])
+        for parents in reversed(self._parents):
+            child = self.child[parents]
+            out[parents] = out[child] + out[child + 1]
+        return out
 
     def radii(self, centre: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance (m,) from a place (m, 3) of each node to the farthest of its points."""
         radius = np.zeros(len(centre))
-        level = np.zeros(1, dtype=np.int64)
-        while len(level):
+        for level in (np.zeros(1, dtype=np.int64), *(_both(self.child[parents]) for parents in self._parents)):
             size = self.stop[level] - self.start[level]
             first = np.cumsum(size) - size
             rows = np.arange(size.sum()) + np.repeat(self.start[level] - first, size)
             offset = self.points[rows] - np.repeat(centre[level], size, axis=0)
             radius[level] = np.sqrt(np.maximum.reduceat(np.einsum("nd,nd->n", offset, offset), first))
-            parents = level[self.child[level] >= 0]
-            level = np.stack([self.child[parents], self.child[parents] + 1], axis=1).ravel()
         return radius
 
     def nearest(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -140,6 +145,20 @@ def _halves(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[n
         middle = (start + stop) // 2
         start, stop = np.stack([start, middle], axis=1).ravel(), np.stack([middle, stop], axis=1).ravel()
     return tuple(np.concatenate(of) for of in zip(*levels, strict=True))  # type: ignore[return-value]
+
+
+def _by_level(child: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Nodes that have children, level by level."""
+    levels, level = [], np.flatnonzero(child[:1] >= 0)
+    while len(level):
+        levels.append(level)
+        below = _both(child[level])
+        level = below[child[below] >= 0]
+    return levels
+
+
+def _both(child: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.stack([child, child + 1], axis=1).ravel()
 
 
 def _groups(count: int) -> NDArray[np.int64]:

@@ -39,6 +39,9 @@ class PlaneTree(DipoleTree):
     array([1., 0.])
     """
 
+    opening = 0.3
+    """As in space, for dipoles alone."""
+
     def _moments(self, dipoles: NDArray[np.float64]) -> NDArray[np.float64]:
         return self._tree.sums(dipoles)
 

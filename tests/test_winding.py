@@ -70,3 +70,15 @@ def test_distance_and_scale_take_no_digits_away(cloud):
         np.testing.assert_allclose(scale * other, one, rtol=0, atol=1e-6 * np.abs(one).max())
     moved = DipoleTree(points + 1e6, areas).outward(normals, eps)
     np.testing.assert_allclose(moved, one, rtol=0, atol=1e-5 * np.abs(one).max())
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-9])
+def test_a_tiny_cluster_beside_a_large_one_is_as_if_alone(cloud, scale):
+    points, normals, areas, eps = cloud
+    alone = DipoleTree(points, areas).outward(normals, eps)
+    both = DipoleTree(
+        np.concatenate([scale * points, points + [3.0, 0.0, 0.0]]), np.concatenate([scale**2 * areas, areas])
+    ).outward(np.concatenate([normals, normals]), np.concatenate([scale * eps, eps]))
+    tolerance = 0.02 * np.abs(alone).max()
+    np.testing.assert_allclose(scale * both[: len(points)], alone, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(both[len(points) :], alone, rtol=0, atol=tolerance)

@@ -43,8 +43,8 @@ class DipoleTree:
     """
 
     opening = 0.5
-    """A node acts as one source where its radius is below this fraction of the distance: on even samplings the direction
-    of the gradient is then 0.1 to 0.2 degrees off that of the exact sum on average, and the number 0.01."""
+    """A node acts as one source where its radius is below this fraction of the distance. On even samplings the gradient
+    is then 0.1 to 0.2 degrees off that of the exact sum on average, and the number 0.01."""
 
     def __init__(self, points: NDArray[np.float64] | PointTree, areas: NDArray[np.float64]) -> None:
         self._tree = points if isinstance(points, PointTree) else PointTree(points)

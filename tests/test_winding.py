@@ -77,7 +77,7 @@ def test_a_tiny_cluster_beside_a_large_one_is_as_if_alone(cloud, scale):
     points, normals, areas, eps = cloud
     alone = DipoleTree(points, areas).outward(normals, eps)
     both = DipoleTree(
-        np.concatenate([scale * points, points + [3.0, 0.0, 0.0]]), np.concatenate([scale**2 * areas, areas])
+        np.concatenate([scale * points, points + np.array([3.0, 0.0, 0.0])]), np.concatenate([scale**2 * areas, areas])
     ).outward(np.concatenate([normals, normals]), np.concatenate([scale * eps, eps]))
     tolerance = 0.02 * np.abs(alone).max()
     np.testing.assert_allclose(scale * both[: len(points)], alone, rtol=0, atol=tolerance)

@@ -22,6 +22,8 @@ from face_plugin.sides.patches import planes_of
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.sights import sights
+from face_plugin.sides.stations import sights_from_station
+from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
 
 __all__ = ["Reading"]
@@ -43,8 +45,12 @@ class Reading:
 
     @cached_property
     def sights(self) -> NDArray[np.float64] | None:
-        """Directions (m, 3) in which sensors saw the distinct points."""
-        return None if self.sensors is None else sights(self.around, self.sensors, planes_of(self.around).lines)
+        """Directions (m, 3) in which sensors saw the distinct points: those given, or that of a single view."""
+        if self.sensors is not None:
+            return sights(self.around, self.sensors, planes_of(self.around).lines)
+        if self.around.plane or self.plane is not None or not is_open(self.seen.difference):
+            return None
+        return sights_from_station(self.around, planes_of(self.around).lines)
 
     @cached_property
     def seen(self) -> FieldAtPoints:
@@ -107,7 +113,9 @@ class Reading:
     @cached_property
     def sides(self) -> NDArray[np.uint8]:
         """What told the sides (m,) of the normals."""
-        return told_by(self.part, self.open, self.as_solids, self.seen, self.looked_at)
+        # A station that density tells may be the mirror image of the true one: what follows is chosen.
+        known = None if self.sensors is None else self.looked_at
+        return told_by(self.part, self.open, self.as_solids, self.seen, known)
 
     def threshold(self, alpha: float | str) -> float:
         """Alpha as a number, which "auto" derives from the leak of the cage."""

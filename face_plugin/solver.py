@@ -134,7 +134,7 @@ class FaCE(Sculptable):
     @property
     def looked_at(self) -> NDArray[np.bool_] | None:
         """Which input points (n,) a sensor saw; None without sensors."""
-        seen = self._reading.looked_at
+        seen = None if self.sensors is None else self._reading.looked_at
         return None if seen is None else seen[self.cloud.rows] & ~self.strays
 
     def lit(self, query: ArrayLike) -> NDArray[np.bool_]:

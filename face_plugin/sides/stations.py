@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.facing import facing
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sights import sights
 
@@ -30,7 +31,7 @@ BEST, FIRST_STEP, LAST_STEP, MOVES = 4, 0.1, 0.002, 100
 # Places tried above and below one in EVERY of the densest of the points, which are one in DENSEST, in extents.
 DENSEST, EVERY, HEIGHTS = 20, 5, (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2)
 # Places that explain it nearly as well, as those of other heights over the ground do, are told apart by how many points
-# are seen from them.
+# are seen from them, and how squarely.
 NEARLY = 2.0
 # A ray that meets the surface at a smaller cosine is as good as along it.
 GRAZING = 0.05
@@ -87,7 +88,8 @@ def find_station(around: Neighbourhood, lines: NDArray[np.float64]) -> Sensors |
     few = Neighbourhood(points)
 
     def seen(place: NDArray[np.float64]) -> float:
-        return float(sights(few, Sensors(place), across).any(axis=1).mean())
+        toward = sights(few, Sensors(place), across)
+        return float(toward.any(axis=1).mean() * np.abs(facing(across, toward)).mean())
 
     return Sensors(max((place for place, rest in found if rest <= NEARLY * least), key=seen)[None])
 

@@ -161,7 +161,7 @@ def refine(
 
     Examples
     --------
-    >>> from face_plugin.geometry import thin, unit
+    >>> from face_plugin.geometry import unit
     >>> from face_plugin.shapes import sphere
     >>> ball = sphere(500)
     >>> rough = unit(ball.normals + 0.3 * np.random.default_rng(0).normal(size=(500, 3)))

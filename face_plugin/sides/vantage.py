@@ -30,16 +30,20 @@ SHIELDED = 0.92
 FEWEST = 100
 # A place counts where it sees most of the points, face on: share of points, times the cosine, times how many agree.
 WORTH = 0.5
-# Where couplings alone, without field and winding number, tell the same sides at 98 of 100 points (mean sign), a place
-# must see more to turn a part: from beyond a wall of a street most of that is seen as well, and the wall from behind.
-WORTH_AGREED, AGREED = 0.75, 0.96
+# Where couplings alone, without field and winding number, tell the same sides at 98 of 100 points (mean sign), what a
+# place sees of the other side counts against it: from beyond a wall of a street most of that is seen as well, and the
+# wall from behind. Parts are turned then where at most a twentieth of what it sees is on the other side.
+AGREED, WORTH_SIGNED, ONE_SIDE = 0.96, 0.3, 0.9
 # A place nearby must be clearly better than a direction from afar: a little better is chance.
 NEAR = 0.98
-# Points that places are looked for with, and how many of the best are then tried with all points.
+# Points that places are looked for with.
 LOOKED_WITH = 700
-TRIED = 2
-# First steps of a place towards a better one, and the last, as fractions of the cloud's extent.
-STEPS = (0.4, 0.2, 0.1, 0.05)
+# Places tried along each axis, over so much of the box; those that then move are the best that are so far apart, in
+# halves of the extent.
+WIDE, WITHIN = 5, 0.9
+TRIED, APART = 2, 0.3
+# Steps of a place towards a better one, as fractions of the cloud's extent.
+STEPS = (0.1, 0.05)
 # A place moves by no more than so many steps of each length: far off, each step farther sees a little more.
 MOVES = 4
 
@@ -85,25 +89,30 @@ def sides_from_vantage(
     lines, edges, coupling = planes or planes_of(around)
     known = np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)
     lines, coupling = lines * known[:, None], coupling * known[edges.first] * known[edges.second]
-    agreed = abs(float(cluster_signs(len(around), edges, coupling).mean()))
-    best, score = np.ones(len(around)), WORTH * NEAR
-    for place in _places(around.points, lines):
+    signed = abs(float(cluster_signs(len(around), edges, coupling).mean())) > AGREED
+    best, score = np.ones(len(around)), (WORTH_SIGNED if signed else WORTH) * NEAR
+    for place in _places(around.points, lines, signed):
         evidence = facing(lines, sights(around, place, lines))
         weight = NEAR if place.up is None else 1.0
         # No more than what is seen at all: most places need no more looking at.
-        if weight * np.abs(evidence).mean() <= score:
+        if weight * _worth(evidence, signed) <= score:
             continue
         # The sides that are known may all be those of the back: what is turned then is turned from that.
         whole = 1.0 if evidence.sum() >= 0 else -1.0
         sign = better_signs(len(around), edges, coupling, whole * SIGHT * evidence)
-        reached = weight * whole * float((evidence * sign).mean())
+        reached = weight * (_worth(evidence, True) if signed else whole * float((evidence * sign).mean()))
         if reached > score:
-            trusted = agreed < AGREED or reached > WORTH_AGREED * NEAR
+            trusted = not signed or _worth(evidence, True) > ONE_SIDE * np.abs(evidence).mean()
             best, score = whole * (sign if trusted else np.ones(len(around))), reached
     return np.asarray(normals * best[:, None])
 
 
-def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sensors]:
+def _worth(evidence: NDArray[np.float64], signed: bool) -> float:
+    """How much a place sees of points (n,), face on; less what it sees of the other side, where sides are known."""
+    return abs(float(evidence.mean())) if signed else float(np.abs(evidence).mean())
+
+
+def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: bool) -> list[Sensors]:
     """Find the places that see the most of the points (n, 3), face on to their lines (n, 3), the best first.
 
     Tried are 26 directions from afar, and places within the box and around it; the best of each then move for as long
@@ -113,19 +122,25 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64]) -> list[Sen
     around, few = Neighbourhood(points[some]), lines[some]
 
     def share(place: Sensors) -> float:
-        return float(np.abs(facing(few, sights(around, place, few))).mean())
+        return _worth(facing(few, sights(around, place, few)), signed)
 
-    steps = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
-    directions = steps[steps.any(axis=1)]
+    directions = _steps(3)[_steps(3).any(axis=1)]
     lower, upper = points.min(axis=0), points.max(axis=0)
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     far = max(directions, key=lambda direction: share(Sensors(up=direction)))
-    starts = [middle + 0.5 * half * step for step in steps] + [middle + half.max() * step for step in directions]
-    starts = sorted(starts, key=lambda start: -share(Sensors(start)))[: TRIED - 1]
+    starts = np.vstack([middle + WITHIN * half * _steps(WIDE), middle + half.max() * directions])
+    starts = starts[np.argsort([-share(Sensors(start)) for start in starts])]
+    apart = np.linalg.norm(starts - starts[0], axis=1) > APART * half.max()
+    starts = np.vstack([starts[:1], starts[apart][: TRIED - 1]])
     near = [_climbed(start, share, 2 * float(half.max())) for start in starts]
     places = [(share(Sensors(up=far)), Sensors(up=far)), (share(Sensors(up=-far)), Sensors(up=-far))]
     places += [(NEAR * share(Sensors(place)), Sensors(place)) for place in near]
-    return [place for _, place in sorted(places, key=lambda found: -found[0])[:TRIED]]
+    return [place for _, place in sorted(places, key=lambda found: -found[0])]
+
+
+def _steps(wide: int) -> NDArray[np.float64]:
+    """Corners (wide^3, 3) of a lattice over the cube from -1 to 1."""
+    return np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, wide)], indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _climbed(place: NDArray[np.float64], share: Callable[[Sensors], float], extent: float) -> NDArray[np.float64]:

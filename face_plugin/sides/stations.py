@@ -80,10 +80,10 @@ def find_stations(around: Neighbourhood, lines: NDArray[np.float64]) -> Sensors 
     several = seen.spread > CHANCE and 2 * len(summed.points) > len(seen.points)
     if several and tried[0][1] > 0.5 * EXPLAINED * seen.spread:
         tried += _several(summed, np.vstack(places[:-2]), extent)
-    found, rest = next(one for one in tried if FEWER * one[1] <= min(rest for _, rest in tried))
-    if rest >= EXPLAINED * seen.spread:
+    found, unexplained = next(one for one in tried if FEWER * one[1] <= min(rest for _, rest in tried))
+    if unexplained >= EXPLAINED * seen.spread:
         return None
-    return Sensors(_at_its_height(seen, singles, found, rest, extent) if len(found) == 1 else found)
+    return Sensors(_at_its_height(seen, singles, found, unexplained, extent) if len(found) == 1 else found)
 
 
 def sights_from_stations(around: Neighbourhood, planes: Planes, *, closed: bool = False) -> NDArray[np.float64] | None:
@@ -205,4 +205,5 @@ def _at_its_height(
 
     enough = max(NEARLY * least, ENOUGH * seen.spread)
     kept = [one for one in zip(places, rest, strict=True) if one[1] <= enough]
-    return max(kept, key=lambda one: worth(*one))[0][None]
+    best_kept: NDArray[np.float64] = max(kept, key=lambda one: worth(*one))[0]
+    return best_kept[None]

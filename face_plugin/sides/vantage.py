@@ -30,10 +30,11 @@ SHIELDED = 0.92
 FEWEST = 100
 # A place counts where it sees most of the points, face on: share of points, times the cosine, times how many agree.
 WORTH = 0.5
-# Where couplings alone, without field and winding number, tell the same sides at 98 of 100 points (mean sign), what a
-# place sees of the other side counts against it: from beyond a wall of a street most of that is seen as well, and the
-# wall from behind. Parts are turned then where at most a twentieth of what it sees is on the other side.
-AGREED, WORTH_SIGNED, ONE_SIDE = 0.96, 0.3, 0.9
+# Where couplings alone, without field and winding number, tell the same sides at 98 of 100 points (mean sign), a place
+# must see more to turn parts of any size. Else what it sees of the other side counts against it: from beyond a wall of
+# a street most of that is seen as well, and the wall from behind. Parts are turned then where at most a twentieth of
+# what it sees is on the other side.
+AGREED, WORTH_AGREED, ONE_SIDE = 0.96, 0.75, 0.9
 # A place nearby must be clearly better than a direction from afar: a little better is chance.
 NEAR = 0.98
 # Points that places are looked for with.
@@ -90,26 +91,23 @@ def sides_from_vantage(
     known = np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)
     lines, coupling = lines * known[:, None], coupling * known[edges.first] * known[edges.second]
     signed = abs(float(cluster_signs(len(around), edges, coupling).mean())) > AGREED
-    best, score = np.ones(len(around)), (WORTH_SIGNED if signed else WORTH) * NEAR
+    best, score = np.ones(len(around)), WORTH * NEAR
     for place in _places(around.points, lines, signed):
         evidence = facing(lines, sights(around, place, lines))
         weight = NEAR if place.up is None else 1.0
+        seen, one_sided = weight * float(np.abs(evidence).mean()), weight * abs(float(evidence.mean()))
+        doubted = signed and seen <= WORTH_AGREED * NEAR
         # No more than what is seen at all: most places need no more looking at.
-        if weight * _worth(evidence, signed) <= score:
+        if (one_sided if doubted else seen) <= score:
             continue
         # The sides that are known may all be those of the back: what is turned then is turned from that.
         whole = 1.0 if evidence.sum() >= 0 else -1.0
         sign = better_signs(len(around), edges, coupling, whole * SIGHT * evidence)
-        reached = weight * (_worth(evidence, True) if signed else whole * float((evidence * sign).mean()))
+        reached = one_sided if doubted else weight * whole * float((evidence * sign).mean())
         if reached > score:
-            trusted = not signed or _worth(evidence, True) > ONE_SIDE * np.abs(evidence).mean()
+            trusted = not doubted or one_sided > ONE_SIDE * seen
             best, score = whole * (sign if trusted else np.ones(len(around))), reached
     return np.asarray(normals * best[:, None])
-
-
-def _worth(evidence: NDArray[np.float64], signed: bool) -> float:
-    """How much a place sees of points (n,), face on; less what it sees of the other side, where sides are known."""
-    return abs(float(evidence.mean())) if signed else float(np.abs(evidence).mean())
 
 
 def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: bool) -> list[Sensors]:
@@ -122,19 +120,23 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: boo
     around, few = Neighbourhood(points[some]), lines[some]
 
     def share(place: Sensors) -> float:
-        return _worth(facing(few, sights(around, place, few)), signed)
+        return float(np.abs(facing(few, sights(around, place, few))).mean())
+
+    def one_sided(place: Sensors) -> float:
+        return abs(float(facing(few, sights(around, place, few)).mean()))
 
     directions = _steps(3)[_steps(3).any(axis=1)]
     lower, upper = points.min(axis=0), points.max(axis=0)
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     far = max(directions, key=lambda direction: share(Sensors(up=direction)))
     starts = np.vstack([middle + WITHIN * half * _steps(WIDE), middle + half.max() * directions])
-    starts = starts[np.argsort([-share(Sensors(start)) for start in starts])]
+    worth = one_sided if signed else share
+    starts = starts[np.argsort([-worth(Sensors(start)) for start in starts])]
     apart = np.linalg.norm(starts - starts[0], axis=1) > APART * half.max()
     starts = np.vstack([starts[:1], starts[apart][: TRIED - 1]])
-    near = [_climbed(start, share, 2 * float(half.max())) for start in starts]
+    near = [_climbed(start, worth, 2 * float(half.max())) for start in starts]
     places = [(share(Sensors(up=far)), Sensors(up=far)), (share(Sensors(up=-far)), Sensors(up=-far))]
-    places += [(NEAR * share(Sensors(place)), Sensors(place)) for place in near]
+    places += [(NEAR * worth(Sensors(place)), Sensors(place)) for place in near]
     return [place for _, place in sorted(places, key=lambda found: -found[0])]
 
 

@@ -22,7 +22,7 @@ from face_plugin.sides.patches import planes_of
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.sights import sights
-from face_plugin.sides.stations import sights_from_stations
+from face_plugin.sides.stations import believed_stations
 from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
 
@@ -48,13 +48,14 @@ class Reading:
         """Directions (m, 3) in which sensors saw the distinct points: those given, or those that density tells."""
         if self.sensors is not None:
             return sights(self.around, self.sensors, planes_of(self.around).lines)
-        if self.around.plane or self.plane is not None:
+        if self.around.plane or self.plane is not None or self.params.angles == "field":
             return None
         # A closed cloud is asked only where something is so dim that it lies inside a body, or stands in a room.
         closed = not is_open(self.seen.difference)
-        if closed and not (self.seen.strength < enclosure.ALPHA_BOUNDS[0]).any():
+        if closed and not enclosure.dim(self.seen.strength).any():
             return None
-        return sights_from_stations(self.around, planes_of(self.around), closed=closed)
+        found = believed_stations(self.around, planes_of(self.around), closed=closed)
+        return None if found is None else found[1]
 
     @cached_property
     def seen(self) -> FieldAtPoints:

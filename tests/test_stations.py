@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from face_plugin import Side, estimate_normals, shapes
+from face_plugin import Execution, Params, Side, estimate_normals, shapes
 from face_plugin.cloud import prepare
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.shapes.scans import camera_rays, ring_rays, scan_boxes, sphere_rays
 from face_plugin.sides.patches import planes_of
 from face_plugin.sides.ray_density import RayDensity
-from face_plugin.sides.stations import find_stations, sights_from_stations
+from face_plugin.sides.stations import believed_stations
 
 YARD = [
     ((-20.0, -20.0, -0.5), (20.0, 20.0, 0.0)),
@@ -39,8 +39,8 @@ def scan(rays, seed=0):
 def found(points):
     cloud = prepare(points)
     around = Neighbourhood(cloud.points)
-    stations = find_stations(around, planes_of(around).lines)
-    return None if stations is None else cloud.frame.from_unit(np.asarray(stations.viewpoints))
+    believed = believed_stations(around, planes_of(around))
+    return None if believed is None else cloud.frame.from_unit(np.asarray(believed[0].viewpoints))
 
 
 @pytest.mark.parametrize("rays", RAYS)
@@ -104,6 +104,21 @@ def test_what_stands_in_a_closed_room_is_not_taken_for_what_lies_inside_a_body(v
     assert not result.interior.any()
 
 
+def test_tiles_find_the_stations_together():
+    points, normals, _ = room(2, 1)
+    execution = Execution(tile_points=5000, engine="serial")
+    result = estimate_normals(points, filter_interior=True, execution=execution)
+    assert ((result.normals * normals).sum(axis=1) > 0).mean() > 0.995
+    assert not result.interior.any()
+    assert (result.sides != Side.SENSOR).all()
+
+
+def test_the_field_alone_asks_no_station():
+    points, normals, _ = room(2, 1)
+    result = estimate_normals(points, Params(angles="field"))
+    assert ((result.normals * normals).sum(axis=1) > 0).mean() < 0.1
+
+
 def test_what_lies_inside_a_body_stays_inside():
     nested = shapes.nested_box(6000)
     result = estimate_normals(nested.points, filter_interior=True)
@@ -124,7 +139,7 @@ def test_the_law_of_rows_needs_no_surface():
     turn = np.linspace(-1.2, 1.2, 400)
     row = np.column_stack([np.tan(turn), np.ones(400), np.zeros(400)])
     points = np.vstack([row + np.array([0.0, 0.0, 5.0 * k]) for k in range(4)])
-    seen = RayDensity.of(Neighbourhood(points), np.tile([0.0, 1.0, 0.0], (1600, 1)), 1600)
+    seen = RayDensity.of(Neighbourhood(points), np.tile([0.0, 1.0, 0.0], (1600, 1)), np.arange(1600))
     assert seen.in_row.all()
     station = np.array([[0.0, 0.0, 0.0]])
     first = points[:, 2] == 0.0
@@ -137,5 +152,5 @@ def test_many_views_are_not_taken_for_few():
     views = np.column_stack([12 * np.cos(turn), 12 * np.sin(turn), np.full(10, 1.8)])
     points = scan_boxes(YARD, views, RAYS["all round"], 9000, np.random.default_rng(0)).points
     around = Neighbourhood(points)
-    toward = sights_from_stations(around, planes_of(around))
-    assert toward is None or ((toward * [0, 0, 1]).sum(axis=1)[points[:, 2] < 0.01] > 0).mean() > 0.99
+    believed = believed_stations(around, planes_of(around))
+    assert believed is None or ((believed[1] * [0, 0, 1]).sum(axis=1)[points[:, 2] < 0.01] > 0).mean() > 0.99

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from face_plugin.faraday.gradient import FieldAtPoints
 from face_plugin.geometry import unit
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.enclosure import ALPHA_BOUNDS, DARK
+from face_plugin.sides.enclosure import DARK, dim
 from face_plugin.sides.parts import open_parts, parts
 from face_plugin.sides.patches import Planes, turned_patches
 from face_plugin.sides.reach import Reach, out_of_reach
@@ -96,9 +96,8 @@ def _sealed(
     reach: Reach, facing: NDArray[np.float64], strength: NDArray[np.float64], asked: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Which points (n,) have space behind them that is sealed off, as far as it is asked."""
-    # What is brighter is not inside, whatever alpha.
-    dim = strength < ALPHA_BOUNDS[0]
-    return dim & reach.sealed_behind(facing) if (dim & asked).any() else np.zeros(len(dim), dtype=np.bool_)
+    maybe = dim(strength)
+    return maybe & reach.sealed_behind(facing) if (maybe & asked).any() else np.zeros(len(maybe), dtype=np.bool_)
 
 
 def sides_as_seen(

@@ -23,7 +23,7 @@ from face_plugin.sides.graph import Edges, connected_parts
 from face_plugin.sides.patches import SMALLEST
 from face_plugin.sides.seams import both_alone
 
-__all__ = ["ALPHA_BOUNDS", "DARK", "automatic_alpha", "enclosed", "threshold"]
+__all__ = ["DARK", "automatic_alpha", "dim", "enclosed", "threshold"]
 
 # Winding numbers above which a point is enclosed by the others: at the point itself the paper's threshold (the surface
 # has 1/2, its concave edges 3/4); a step outward somewhat more than that of the surface; and there, with the points
@@ -60,6 +60,17 @@ PASSES = (0.6, 0.7, 0.8)
 # What is enclosed shows how far the field leaks in: alpha is this percentile of its strength, within the bounds.
 LEAK_PERCENTILE = 90.0
 ALPHA_BOUNDS = (0.03, 0.3)
+
+
+def dim(strength: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where the field (n,) is so weak that what is there may be inside, whatever alpha.
+
+    Examples
+    --------
+    >>> dim(np.array([0.01, 0.1]))
+    array([ True, False])
+    """
+    return strength < ALPHA_BOUNDS[0]
 
 
 def enclosed(

@@ -28,7 +28,7 @@ from face_plugin.planes import plane_fits
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 
-__all__ = ["HOLD_FIELD", "SMALLEST", "Planes", "closure", "planes_of", "turned_patches", "winding_number"]
+__all__ = ["HOLD_FIELD", "SMALLEST", "Planes", "closure", "lines_at", "planes_of", "turned_patches", "winding_number"]
 
 # Neighbours of the plane that a sheet is taken for, as hosts take by default.
 PLANE_NEIGHBOURS = 30
@@ -99,11 +99,28 @@ def planes_of(around: Neighbourhood) -> Planes:
     >>> planes.lines.shape, bool((planes.coupling > 0).mean() > 0.4)
     ((500, 3), True)
     """
-    count = min(PLANE_NEIGHBOURS, len(around) - 1)
-    lines, flatness = plane_fits(around.points, around.distance, around.neighbour, count, 1.0)
+    lines, flatness = _fitted(around, slice(None))
     edges = neighbours_around(around, lines)
     trust = flatness**2
     return Planes(lines, edges, couplings(around.points, lines, edges) * trust[edges.first] * trust[edges.second])
+
+
+def lines_at(around: Neighbourhood, some: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Lines (m, 3) of the planes of some points (m,), as `planes_of` has them of all.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> around = Neighbourhood(sphere(500).points)
+    >>> bool((lines_at(around, np.array([3, 7])) == planes_of(around).lines[[3, 7]]).all())
+    True
+    """
+    return _fitted(around, some)[0]
+
+
+def _fitted(around: Neighbourhood, some: slice | NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    count = min(PLANE_NEIGHBOURS, len(around) - 1)
+    return plane_fits(around.points, around.distance[some], around.neighbour[some], count, 1.0)
 
 
 def turned_patches(

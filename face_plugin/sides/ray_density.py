@@ -35,7 +35,7 @@ class RayDensity:
     >>> ray = np.random.default_rng(0).normal(size=(4000, 3))
     >>> ray = ray[ray[:, 2] < -0.4 * np.linalg.norm(ray, axis=1)]
     >>> floor = ray / -ray[:, 2:]  # seen from a height of 1
-    >>> seen = RayDensity.of(Neighbourhood(floor), np.tile([0.0, 0.0, 1.0], (len(ray), 1)), 500)
+    >>> seen = RayDensity.of(Neighbourhood(floor), np.tile([0.0, 0.0, 1.0], (500, 1)), np.arange(500))
     >>> here, there = seen.left(seen.expected(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]])))
     >>> bool(here < 0.7 * seen.spread < there)
     True
@@ -53,18 +53,20 @@ class RayDensity:
     """(m,) logarithm of the spacing squared."""
 
     @classmethod
-    def of(cls, around: Neighbourhood, lines: NDArray[np.float64], count: int) -> RayDensity:
-        """Take about `count` points of a cloud, with unit normals `lines` (n, 3) of either sign."""
-        some = np.unique(np.linspace(0, len(around) - 1, count).astype(np.intp))
+    def of(cls, around: Neighbourhood, across: NDArray[np.float64], some: NDArray[np.intp]) -> RayDensity:
+        """Take some points (m,) of a cloud, with their unit normals (m, 3) of either sign."""
         offset = around.points[around.neighbour[some, 1 : SPACING_NEIGHBOURS + 1]] - around.points[some, None]
         spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))
         in_row = spread[:, 1] < ROW * spread[:, 2]
         area = 2.0 * np.log(around.spacing[some])
-        return cls(around.points[some], lines[some], axes[:, :, 2], in_row, area)
+        return cls(around.points[some], across, axes[:, :, 2], in_row, area)
 
     def but_rows(self) -> RayDensity:
         """Leave out what is part of a row."""
-        kept = ~self.in_row
+        return self.part(~self.in_row)
+
+    def part(self, kept: slice | NDArray[np.bool_]) -> RayDensity:
+        """Keep some of the points."""
         return RayDensity(self.points[kept], self.across[kept], self.along[kept], self.in_row[kept], self.area[kept])
 
     def expected(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -89,8 +91,8 @@ class RayDensity:
         """
         rest = self.area + np.log(density)
         for kind in self._kinds:
-            rest[..., kind] -= np.median(rest[..., kind], axis=-1, keepdims=True)
-        return np.asarray(np.median(np.abs(rest[..., self._told]), axis=-1))
+            rest[..., kind] -= _median(rest[..., kind])[..., None]
+        return _median(np.abs(rest[..., self._told]))
 
     @cached_property
     def spread(self) -> float:
@@ -105,3 +107,9 @@ class RayDensity:
     @cached_property
     def _told(self) -> NDArray[np.intp]:
         return np.concatenate(self._kinds)
+
+
+def _median(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Median (...) of values (..., m), the upper one of two: a third of the time of NumPy's, for few at a time."""
+    middle = values.shape[-1] // 2
+    return np.asarray(np.partition(values, middle, axis=-1)[..., middle])

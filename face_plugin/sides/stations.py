@@ -16,7 +16,7 @@ from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sights import sights
 
-__all__ = ["find_stations", "sights_from_stations"]
+__all__ = ["LOOKED_WITH", "believed_stations", "find_stations"]
 
 # Stations are believed where the logarithms of area are nearer to what they say than to one another by this, by
 # medians: 0.02 to 0.7 on one to four views, generated and real; 0.7 to 1.0 on eight and more, on what a camera saw from
@@ -34,10 +34,11 @@ MOST, FEWER = 4, 0.95
 LOOKED_WITH = 2000
 # Places tried along each axis, over the box and so much of its extent around it.
 PLACES, AROUND = (9, 5, 5), (0.0, 0.25, 1.5)
-# Several are looked for with one in so many of the points at first, and are so far apart, in extents.
-EVERY_OTHER, APART = 2, 0.12
-# The best of each kind move as long as they get better, at most so many times: first and last step, in extents.
-BEST, FIRST_STEP, LAST_STEP, MOVES = 2, 0.1, 0.002, 100
+# Where several are looked for, the search starts with so many, so far apart in extents.
+START, APART = 6, 0.12
+# The best of each kind move as long as they get better, at most so many times: first and last step, in extents, and the
+# last while it is only asked which of several are missed least.
+BEST, FIRST_STEP, LAST_STEP, ROUGHLY, MOVES = 2, 0.1, 0.002, 0.01, 100
 # Places tried above and below one in EVERY of the densest of the points, which are one in DENSEST, in extents.
 DENSEST, EVERY, HEIGHTS = 20, 5, (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2)
 # Places that explain it nearly as well, as those of other heights over the ground do, or well enough, are told apart by
@@ -45,7 +46,7 @@ DENSEST, EVERY, HEIGHTS = 20, 5, (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2
 NEARLY, ENOUGH = 2.0, 0.2
 
 
-def find_stations(around: Neighbourhood, lines: NDArray[np.float64]) -> Sensors | None:
+def find_stations(seen: RayDensity) -> Sensors | None:
     """Find the places from which a cloud was scanned, where there were few.
 
     The density is a sum over stations. Non-negative least squares over places everywhere tells about where they are;
@@ -53,21 +54,18 @@ def find_stations(around: Neighbourhood, lines: NDArray[np.float64]) -> Sensors 
 
     Parameters
     ----------
-    around : Neighbourhood
-        Of n points.
-    lines : (n, 3) float64
-        Unit normals, of either sign.
+    seen : RayDensity
+        About `LOOKED_WITH` points of the cloud.
 
     Examples
     --------
     >>> ray = np.random.default_rng(0).normal(size=(6000, 3))
     >>> ray = ray[ray[:, 2] < -0.4 * np.linalg.norm(ray, axis=1)]
-    >>> floor = ray / -ray[:, 2:] + np.array([0.0, 0.0, 1.0])  # seen from a height of 1
-    >>> station = find_stations(Neighbourhood(floor), np.tile([0.0, 0.0, 1.0], (len(ray), 1)))
+    >>> floor = Neighbourhood(ray / -ray[:, 2:] + np.array([0.0, 0.0, 1.0]))  # seen from a height of 1
+    >>> station = find_stations(RayDensity.of(floor, np.tile([0.0, 0.0, 1.0], (1000, 1)), np.arange(1000)))
     >>> bool(np.allclose(np.abs(station.viewpoints), [[0.0, 0.0, 1.0]], atol=0.2))  # it, or its mirror image
     True
     """
-    seen = RayDensity.of(around, lines, LOOKED_WITH)
     extent = float(np.ptp(seen.points, axis=0).max())
     places = [*_over_the_box(seen, extent), _near_the_densest(seen, extent)]
     singles = []
@@ -86,8 +84,10 @@ def find_stations(around: Neighbourhood, lines: NDArray[np.float64]) -> Sensors 
     return Sensors(_at_its_height(seen, singles, found, unexplained, extent) if len(found) == 1 else found)
 
 
-def sights_from_stations(around: Neighbourhood, planes: Planes, *, closed: bool = False) -> NDArray[np.float64] | None:
-    """Directions (n, 3) in which points were seen from the stations that their density tells, as `sights` has them.
+def believed_stations(
+    around: Neighbourhood, planes: Planes, seen: RayDensity | None = None, *, closed: bool = False
+) -> tuple[Sensors, NDArray[np.float64]] | None:
+    """Find the stations that the density of a cloud tells, and the directions in which points were seen from them.
 
     None where it tells none, and where too little is in sight of what it tells, or sides would be at odds along sheets.
 
@@ -97,22 +97,32 @@ def sights_from_stations(around: Neighbourhood, planes: Planes, *, closed: bool 
         Of n points.
     planes : Planes
         Those of `around`.
+    seen : RayDensity, optional
+        Some of the points as they were scanned, where `around` is thinned.
     closed : bool, default: False
         Whether it is a closed body, or looks like one, as a room does. Most bodies are evenly sampled, which is told at
         once then. Do not ask of those with nothing inside: they may have been sampled by rays from their middle.
+
+    Returns
+    -------
+    tuple or None
+        The stations, and directions (n, 3) as `sights` has them.
 
     Examples
     --------
     >>> from face_plugin.shapes import sphere
     >>> from face_plugin.sides.patches import planes_of
     >>> around = Neighbourhood(sphere(1000).points)
-    >>> sights_from_stations(around, planes_of(around)) is None
+    >>> believed_stations(around, planes_of(around)) is None
     True
     """
     lines, edges, coupling = planes
-    if closed and RayDensity.of(around, lines, LOOKED_WITH).spread < CHANCE:
+    if seen is None:
+        some = np.unique(np.linspace(0, len(around) - 1, LOOKED_WITH).astype(np.intp))
+        seen = RayDensity.of(around, lines[some], some)
+    if closed and seen.spread < CHANCE:
         return None
-    stations = find_stations(around, lines)
+    stations = find_stations(seen)
     if stations is None:
         return None
     toward = sights(around, stations, lines)
@@ -120,7 +130,7 @@ def sights_from_stations(around: Neighbourhood, planes: Planes, *, closed: bool 
     says = coupling * evidence[edges.first] * evidence[edges.second]
     if toward.any(axis=1).mean() < SEEN or says.sum() < AGREED * np.abs(says).sum():
         return None
-    return toward
+    return stations, toward
 
 
 def _over_the_box(seen: RayDensity, extent: float) -> list[NDArray[np.float64]]:
@@ -146,23 +156,27 @@ def _densest(seen: RayDensity) -> NDArray[np.intp]:
 
 def _several(seen: RayDensity, places: NDArray[np.float64], extent: float) -> list[tuple[NDArray[np.float64], float]]:
     """Find sets of two to `MOST` stations, and what each leaves unexplained, from places (k, 3) to start at."""
-    share = (np.exp(seen.area) * seen.expected(places)).T[::EVERY_OTHER]
+    few = seen.part(slice(None, None, 2))
+    share = (np.exp(few.area) * few.expected(places)).T
     strength = nnls(share, np.ones(len(share)), maxiter=10 * len(places))[0] * share.mean(axis=0)
     chosen: list[int] = []
     for k in np.argsort(-strength):
         if all(np.linalg.norm(places[k] - places[other]) > APART * extent for other in chosen):
             chosen.append(int(k))
-        if len(chosen) == MOST:
+        if len(chosen) == START:
             break
-    found = [_climbed(seen, places[chosen], extent)]
-    while len(found[-1][0]) > 2:
+    fewest = few.part(slice(None, None, 2))
+    sets = [_climbed(fewest, places[chosen], extent, ROUGHLY)[0]]
+    while len(sets[-1]) > 2:
         # Without the one that is missed least, the others may do as well.
-        fewer = [np.delete(found[-1][0], k, axis=0) for k in range(len(found[-1][0]))]
-        found.append(min((_climbed(seen, some, extent) for some in fewer), key=lambda one: one[1]))
-    return found[::-1]
+        fewer = [np.delete(sets[-1], k, axis=0) for k in range(len(sets[-1]))]
+        sets.append(min((_climbed(fewest, some, extent, ROUGHLY) for some in fewer), key=lambda one: one[1])[0])
+    return [_climbed(seen, some, extent) for some in sets[::-1] if len(some) <= MOST]
 
 
-def _climbed(seen: RayDensity, places: NDArray[np.float64], extent: float) -> tuple[NDArray[np.float64], float]:
+def _climbed(
+    seen: RayDensity, places: NDArray[np.float64], extent: float, last: float = LAST_STEP
+) -> tuple[NDArray[np.float64], float]:
     """Move places (k, 3) along the axes, in turns, for as long as less is left unexplained; that is told as well."""
     places, axes, step = places.copy(), np.vstack([np.eye(3), -np.eye(3)]), FIRST_STEP
     density = seen.expected(places)
@@ -177,7 +191,7 @@ def _climbed(seen: RayDensity, places: NDArray[np.float64], extent: float) -> tu
             if rest[best] < least:
                 places[k], density[k], least = tried[best], there[best], float(rest[best])
         if least == before:
-            if step <= LAST_STEP:
+            if step <= last:
                 break
             step /= 2
     return places, least

@@ -53,7 +53,7 @@ def known_of(store: Store) -> Known:
     opened = open_parts(part, field)
     seen = found["seen"] > 0 if "seen" in found else None
     nesting = None if store.params.nested == "solid" else cavities(around, oriented, part, seen)
-    sides = told_by(part, opened, oriented, field, seen)
+    sides = told_by(part, opened, oriented, field, None if store.guessed else seen)
     return Known(around.points, opened, sides, borne_out(part, sides, oriented, field), nesting)
 
 

@@ -25,6 +25,7 @@ from face_plugin.tiles.parts import known_of
 from face_plugin.tiles.plan import make_engine, tile_size
 from face_plugin.tiles.prepare import fill_store, store_key
 from face_plugin.tiles.scene import write_far
+from face_plugin.tiles.stations import stations_of
 from face_plugin.tiles.store import Store
 from face_plugin.tiles.tile import ORIENT_STAGES, TILE_STAGES, one_thread, orient_tile, solve_tile
 
@@ -174,6 +175,11 @@ def solve_store(
             _run(running, solve_tile, store, "field", "tiles", report)
         with clock("normals"):
             write_far(store)
+            if store.sensors is None:
+                stations = stations_of(store)
+                if stations is not None:
+                    store = dataclasses.replace(store, sensors=stations, guessed=True)
+                    store.save()
             _run(running, orient_tile, store, "normals", "normals", report)
     return store, clock.seconds
 

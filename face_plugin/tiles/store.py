@@ -27,7 +27,7 @@ from face_plugin.sides.sensors import Sensors
 
 __all__ = ["Store", "Subset"]
 
-VERSION = 6
+VERSION = 7
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,8 @@ class Store:
         The normal of a cloud that lies in one plane.
     sensors : Sensors or None
         Where sensors stood, in the canonical frame.
+    guessed : bool
+        Whether they are stations that the density tells, and were not given.
     memory : float or None
         Bytes that meshing may take; None: all that are free.
     """
@@ -82,6 +84,7 @@ class Store:
     voxel: float
     plane: NDArray[np.float64] | None = None
     sensors: Sensors | None = None
+    guessed: bool = False
     memory: float | None = None
 
     @property
@@ -116,6 +119,7 @@ class Store:
                 "voxel": self.voxel,
                 "plane": None if self.plane is None else self.plane.tolist(),
                 "sensors": None if self.sensors is None else self.sensors.to_dict(),
+                "guessed": self.guessed,
                 "memory": self.memory,
             }
         )
@@ -155,6 +159,7 @@ class Store:
             voxel=text["voxel"],
             plane=None if text["plane"] is None else np.array(text["plane"]),
             sensors=None if text["sensors"] is None else Sensors(**text["sensors"]),
+            guessed=text["guessed"],
             memory=text["memory"],
         )
 

@@ -35,6 +35,7 @@ from face_plugin.stages import Clock
 from face_plugin.threads import KDTree
 from face_plugin.tiles.coarse import Coarse
 from face_plugin.tiles.scene import scene
+from face_plugin.tiles.stations import as_scanned
 from face_plugin.tiles.store import Store
 from face_plugin.tiles.surroundings import Surroundings, surroundings
 
@@ -115,6 +116,8 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         stray = find_strays(around)
         if stray.any():
             around = Neighbourhood(part.points[~stray])
+        place = np.maximum(np.cumsum(~stray) - 1, 0)[part.own]
+        scanned = as_scanned(store, tile, around, place, stray[part.own]) if store.refines else {}
     solved = solve_field(
         around,
         params,
@@ -130,7 +133,6 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         if store.refines:
             # The second stage needs them as well, and to look for them is a fifth of all work.
             sheets = solved.sheets or find_sheets(around)
-            place = np.maximum(np.cumsum(~stray) - 1, 0)[part.own]
             found = {name: values[place] for name, values in vars(sheets).items()}
         if store.interior:
             # Inside an isosurface is where the field is below its value, in the tile's box as everywhere.
@@ -140,6 +142,7 @@ def _solve(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         voxels = KDTree(own).query(store.voxels(tile))[1]
     return {
         **found,
+        **scanned,
         # Strays are in no field: they have no vote.
         "strength": np.where(stray[part.own], 0.0, seen.strength),
         "stray": stray[part.own],

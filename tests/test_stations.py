@@ -110,7 +110,7 @@ def test_tiles_find_the_stations_together():
     result = estimate_normals(points, filter_interior=True, execution=execution)
     assert ((result.normals * normals).sum(axis=1) > 0).mean() > 0.995
     assert not result.interior.any()
-    assert (result.sides != Side.SENSOR).all()
+    assert (result.sides != Side.SENSORS).all()
 
 
 def test_the_field_alone_asks_no_station():

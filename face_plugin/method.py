@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from face_plugin.angles.borders import bend_borders
 from face_plugin.angles.curves import turn_to_curves
-from face_plugin.angles.levelling import level, level_weight
+from face_plugin.angles.levelling import levelled, levelling_weight
 from face_plugin.angles.turning import turn_angles
 from face_plugin.faraday import field
 from face_plugin.faraday.domain import Box
@@ -195,8 +195,8 @@ def refine(
         refined = bend_borders(points, refined, field.votes, field.strength, neighbour)
 
     # 4. Level: the surface that the normals describe together is made to pass through the points.
-    weight = level_weight(around.distance, neighbour, turned.error)
-    refined = level(around.tree, refined, neighbour, turned.width, weight)
+    weight = levelling_weight(around.distance, neighbour, turned.error)
+    refined = levelled(around.tree, refined, neighbour, turned.width, weight)
     if sights is not None:
         # The angle is known better now, and so is which side of it was seen.
         refined = resettled(around, refined, sights, unit(blind))

@@ -48,7 +48,7 @@ SUGGESTED = (5, 12)
 # Points whose spacing is looked at.
 PROBES = 2_000
 # Measured with Open3D and PyMeshLab on spheres of 20k and 200k points at depths 7 to 10 (docs/scaling.md):
-# bytes for a finest cell with points in it, and the further share for each level below the spacing.
+# bytes for a finest cell with points in it, and the further share for each depth below the spacing.
 CELL_BYTES = 1.5e3
 DEEPER_SHARE = 0.6
 _BITS = 20
@@ -291,7 +291,7 @@ def warn_if_too_large(points: NDArray[np.floating], depth: int) -> None:
     if needed > free:
         log.warning(
             "a reconstruction of depth %d from %d points takes about %.3g GB, and %.3g GB are free: it may be killed; "
-            "the points bear a depth of %d, and each level less takes about a quarter",
+            "the points bear a depth of %d, and each less takes about a quarter",
             depth,
             len(points),
             needed / GIGABYTE,

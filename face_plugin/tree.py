@@ -62,7 +62,7 @@ class PointTree:
         self.points = points[self.order]
         self.start, self.stop, self.child = _halves(len(points))
         self.groups = _groups(len(points))
-        self._parents = _by_level(self.child)
+        self._parents = _by_depth(self.child)
 
     def sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Add up (m, c) the values (n, c) of each node's points, which are in the order of the tree."""
@@ -79,12 +79,12 @@ class PointTree:
     def radii(self, centre: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance (m,) from a place (m, 3) of each node to the farthest of its points."""
         radius = np.zeros(len(centre))
-        for level in (np.zeros(1, dtype=np.int64), *(_both(self.child[parents]) for parents in self._parents)):
-            size = self.stop[level] - self.start[level]
+        for nodes in (np.zeros(1, dtype=np.int64), *(_both(self.child[parents]) for parents in self._parents)):
+            size = self.stop[nodes] - self.start[nodes]
             first = np.cumsum(size) - size
-            rows = np.arange(size.sum()) + np.repeat(self.start[level] - first, size)
-            offset = self.points[rows] - np.repeat(centre[level], size, axis=0)
-            radius[level] = np.sqrt(np.maximum.reduceat(np.einsum("nd,nd->n", offset, offset), first))
+            rows = np.arange(size.sum()) + np.repeat(self.start[nodes] - first, size)
+            offset = self.points[rows] - np.repeat(centre[nodes], size, axis=0)
+            radius[nodes] = np.sqrt(np.maximum.reduceat(np.einsum("nd,nd->n", offset, offset), first))
         return radius
 
     def nearest(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -133,28 +133,28 @@ def _compact_order(points: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _halves(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """First and last of each node's run, and its first child, level by level."""
-    levels = []
+    """First and last of each node's run, and its first child, depth by depth."""
+    depths = []
     start, stop, nodes = np.zeros(1, np.int64), np.full(1, count), 1
     while len(start):
         split = stop - start > LEAF
         child = np.where(split, nodes + 2 * (np.cumsum(split) - 1), -1)
-        levels.append((start, stop, child))
+        depths.append((start, stop, child))
         nodes += 2 * int(split.sum())
         start, stop = start[split], stop[split]
         middle = (start + stop) // 2
         start, stop = np.stack([start, middle], axis=1).ravel(), np.stack([middle, stop], axis=1).ravel()
-    return tuple(np.concatenate(of) for of in zip(*levels, strict=True))  # type: ignore[return-value]
+    return tuple(np.concatenate(of) for of in zip(*depths, strict=True))  # type: ignore[return-value]
 
 
-def _by_level(child: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Nodes that have children, level by level."""
-    levels, level = [], np.flatnonzero(child[:1] >= 0)
-    while len(level):
-        levels.append(level)
-        below = _both(child[level])
-        level = below[child[below] >= 0]
-    return levels
+def _by_depth(child: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Nodes that have children, depth by depth."""
+    depths, nodes = [], np.flatnonzero(child[:1] >= 0)
+    while len(nodes):
+        depths.append(nodes)
+        below = _both(child[nodes])
+        nodes = below[child[below] >= 0]
+    return depths
 
 
 def _both(child: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -189,10 +189,10 @@ def _combined(
                 good = same & (off_middle <= 1.0 + 1e-9) & np.isfinite(rest)
                 if not good.any():
                     continue
-                level, slope, bend = fits.shape[k, model, j].T
+                height, slope, bend = fits.shape[k, model, j].T
                 rim = 1.0 if model == 0 else 1.0 + RIM * off_middle
                 doubt = TOLERANCE * noise * np.sqrt(2.0 / np.maximum(used - model - 2, 1))
-                own = across - (level + (slope + bend * x) * x) * r
+                own = across - (height + (slope + bend * x) * x) * r
                 beyond = np.maximum(np.where(good, rest, 0.0) - noise - doubt, 0.0) + (doubt if place else 0.0)
                 beyond = beyond + np.maximum(own**2 - OFF**2 * noise, 0.0)
                 chance = np.where(good, fits.gain[k, model, j], 0.0) * rim * (noise + (FLATNESS * r) ** 2)

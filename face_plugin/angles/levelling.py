@@ -9,14 +9,14 @@ from face_plugin.geometry import ramp, unit
 from face_plugin.medians import medians
 from face_plugin.winding import DipoleTree
 
-__all__ = ["level", "level_weight"]
+__all__ = ["levelled", "levelling_weight"]
 
 # Gradient steps, and their length: with more or longer ones angles get worse than the surface gets better.
 STEPS = 3
 RATE = 1.45
 # Area of a point of an even sampling, in squares of the mean distance to its 6 nearest.
 AREA = 0.87
-# A point off the level by more than FARTHEST is no sample of one surface, and by more than FAR is as one off by FAR.
+# A point off the surface by more than FARTHEST is no sample of one surface, and by more than FAR is as one off by FAR.
 FAR = 0.25
 FARTHEST = 0.35
 # Weights rise from 0 to 1 (or fall from 1 to 0) between these. Nearest distance in spacings, mean of the 24 nearest:
@@ -28,7 +28,7 @@ POSITIONS = np.radians(4.0) ** 2
 AROUND = 24
 
 
-def level_weight(
+def levelling_weight(
     distance: NDArray[np.float64], neighbour: NDArray[np.intp], error: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """How far (n,) the positions say more of the normals than is known already, in [0, 1].
@@ -46,7 +46,7 @@ def level_weight(
     >>> from scipy.spatial import cKDTree
     >>> from face_plugin.shapes import sphere
     >>> found = cKDTree(ball := sphere(500).points).query(ball, k=97)
-    >>> bool(level_weight(*found, np.full(500, 0.1)).min() > 0.5)
+    >>> bool(levelling_weight(*found, np.full(500, 0.1)).min() > 0.5)
     True
     """
     evenness = distance[:, 1] / distance[:, 1:7].mean(axis=1)
@@ -54,7 +54,7 @@ def level_weight(
     return np.asarray(even * error / (error + POSITIONS))
 
 
-def level(
+def levelled(
     tree: DipoleTree,
     normals: NDArray[np.float64],
     neighbour: NDArray[np.intp],
@@ -78,7 +78,7 @@ def level(
     width : (n,) float64
         Of the kernel at each point; 0 where the normal is to stay.
     weight : (n,) float64
-        As `level_weight` has it.
+        As `levelling_weight` has it.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def level(
     >>> ball = sphere(500)
     >>> distance, neighbour = cKDTree(ball.points).query(ball.points, k=25)
     >>> tree = DipoleTree(ball.points, distance[:, 1:7].mean(axis=1) ** 2)
-    >>> turned = level(tree, ball.normals, neighbour, 0.5 * distance[:, 1], np.ones(500))
+    >>> turned = levelled(tree, ball.normals, neighbour, 0.5 * distance[:, 1], np.ones(500))
     >>> bool(((turned * ball.normals).sum(axis=1) > 0.99).all())
     True
     """

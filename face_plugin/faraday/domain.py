@@ -20,7 +20,7 @@ COARSE_CELLS = 6
 JITTER = 0.15
 # Smallest distance of a free vertex to a ball's centre, in local spacings.
 CLEARANCE = 0.75
-MAXIMUM_LEVEL = 40
+MAXIMUM_DEPTH = 40
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,8 @@ def fill(
     octants = _corners(len(side))[None]
     rng = np.random.default_rng(seed)
     cells_so_far = 0
-    for level in range(MAXIMUM_LEVEL):
-        size = side / (cells << level)
+    for depth in range(MAXIMUM_DEPTH):
+        size = side / (cells << depth)
         centre = box.lower + (cell + 0.5) * size
         distance, nearest = tree.query(centre)
         split = size.max() > np.maximum(grading * distance, finest * spacing[nearest])
@@ -128,7 +128,7 @@ def fill(
         jittered = leaf + rng.uniform(-JITTER, JITTER, leaf.shape) * size
         near, ball = tree.query(jittered)
         inner.append(jittered[near > CLEARANCE * spacing[ball]])
-        outer.append(_on_box(leaf_cell, cells << level, box))
+        outer.append(_on_box(leaf_cell, cells << depth, box))
         if not split.any():
             break
         cell = (2 * cell[split][:, None] + octants).reshape(-1, len(side))
@@ -151,6 +151,6 @@ def _on_box(cell: NDArray[np.int64], cells: NDArray[np.int64], box: Box) -> NDAr
 
 
 def _unique(points: NDArray[np.float64], size: float) -> NDArray[np.float64]:
-    """Drop repeated points: corners of one place computed at two levels may differ by rounding."""
+    """Drop repeated points: corners of one place computed at two depths may differ by rounding."""
     _, first = np.unique(np.round(points / (1e-9 * size)).astype(np.int64), axis=0, return_index=True)
     return points[np.sort(first)]

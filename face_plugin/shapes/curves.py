@@ -147,10 +147,10 @@ def letter(n: int, seed: int = 0, *, slot: float = 0.1, even: bool = True) -> Sh
     (200, 2)
     """
     arm = (1.0 - 2.0 * slot) / 3.0
-    levels = [arm, arm + slot, 2 * arm + slot, 2 * arm + 2 * slot]
+    heights = [arm, arm + slot, 2 * arm + slot, 2 * arm + 2 * slot]
     right, inner = 0.6, 0.2
     corners = [(0.0, 0.0), (right, 0.0)]
-    for low, high in (levels[:2], levels[2:]):
+    for low, high in (heights[:2], heights[2:]):
         corners += [(right, low), (inner, low), (inner, high), (right, high)]
     return along([np.array([*corners, (right, 1.0), (0.0, 1.0)])], n, seed, even=even)
 

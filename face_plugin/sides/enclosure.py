@@ -111,8 +111,8 @@ def enclosed(
     outer = normals
     number = tree.number(outer, width)
     left_out = np.zeros(len(points), dtype=np.bool_)
-    for level in PASSES:
-        inner = (strength < DARK) & (number > level)
+    for bound in PASSES:
+        inner = (strength < DARK) & (number > bound)
         if not np.array_equal(inner, left_out):
             left_out = inner
             outer = np.where(inner[:, None], 0.0, normals)
@@ -122,10 +122,10 @@ def enclosed(
     step = STEP * spacing[rows]
     scattered = _scatters(around, normals, rows)
     step[scattered] += _band(around, normals, rows[scattered])
-    for dipoles, level in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
+    for dipoles, bound in ((outer, STILL_ENCLOSED), (normals, BY_ALL)):
         if len(rows) == 0:
             return found
-        still = tree.number(dipoles, width[rows], points[rows] + step[:, None] * normals[rows]) > level
+        still = tree.number(dipoles, width[rows], points[rows] + step[:, None] * normals[rows]) > bound
         found[rows] = still
         rows, step = rows[still], step[still]
     # What lies inside is a surface of its own. Fewer points are the deepest of a noisy sheet, or of a narrow slot.

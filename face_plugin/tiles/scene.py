@@ -2,7 +2,7 @@
 
 Winding numbers need the whole surface, but dipoles far away may stand for one another: points are thinned to
 a fixed share of their distance. Those of the tiles around come from these; beyond, the points of the coarse
-level do.
+cage do.
 """
 
 from __future__ import annotations

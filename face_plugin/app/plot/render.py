@@ -56,9 +56,9 @@ class Camera:
         azimuth, elevation = np.radians(view)
         k = "xyz".index(up)
         upward, ahead, side = np.eye(3)[k], np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3]
-        level = np.cos(azimuth) * ahead + np.sin(azimuth) * side
-        towards = np.cos(elevation) * level + np.sin(elevation) * upward
-        right = np.cross(upward, level)
+        flat = np.cos(azimuth) * ahead + np.sin(azimuth) * side
+        towards = np.cos(elevation) * flat + np.sin(elevation) * upward
+        right = np.cross(upward, flat)
         axes = np.stack([right, np.cross(towards, right), towards])
         seen = np.asarray(points, dtype=np.float64) @ axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)

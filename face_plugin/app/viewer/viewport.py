@@ -40,9 +40,9 @@ def stand(ps: Any, points: NDArray[np.floating], up: Up, size: tuple[int, int]) 
     """
     k, (azimuth, elevation) = "xyz".index(up), np.radians(STANDPOINT)
     upward, ahead, side = np.eye(3)[k], np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3]
-    level = np.cos(azimuth) * ahead + np.sin(azimuth) * side
-    towards = np.cos(elevation) * level + np.sin(elevation) * upward
-    right = np.cross(upward, level)
+    flat = np.cos(azimuth) * ahead + np.sin(azimuth) * side
+    towards = np.cos(elevation) * flat + np.sin(elevation) * upward
+    right = np.cross(upward, flat)
     lower, upper = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
     middle, diagonal = 0.5 * lower + 0.5 * upper, float(np.linalg.norm(upper - lower))
     ps.set_automatically_compute_scene_extents(False)

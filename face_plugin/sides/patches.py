@@ -88,6 +88,12 @@ class Planes(NamedTuple):
     coupling: NDArray[np.float64]
     """(e,) as of `couplings`; less where the points lie on no plane."""
 
+    def along(self, normals: NDArray[np.float64]) -> Planes:
+        """Turn the lines to the side of normals (n, 3)."""
+        side = np.where(np.einsum("nd,nd->n", self.lines, normals) < 0, -1.0, 1.0)
+        coupling = self.coupling * side[self.edges.first] * side[self.edges.second]
+        return Planes(self.lines * side[:, None], self.edges, coupling)
+
 
 def planes_of(around: Neighbourhood) -> Planes:
     """Find the planes of a neighbourhood: once for all who ask it for sides.
@@ -167,9 +173,7 @@ def turned_patches(
     """
     closed = closure(around, normals)
     if planes is not None:
-        lines, edges, coupling = planes
-        side = np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)
-        coupling = coupling * side[edges.first] * side[edges.second]
+        _, edges, coupling = planes.along(normals)
         sign = cluster_signs(len(around), edges, coupling)
     else:
         edges = neighbours_around(around, normals)

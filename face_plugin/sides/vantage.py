@@ -87,9 +87,7 @@ def sides_from_vantage(
     >>> float(abs(turned[:, 2].mean()))
     1.0
     """
-    lines, edges, coupling = planes or planes_of(around)
-    known = np.where(np.einsum("nd,nd->n", lines, normals) < 0, -1.0, 1.0)
-    lines, coupling = lines * known[:, None], coupling * known[edges.first] * known[edges.second]
+    lines, edges, coupling = (planes or planes_of(around)).along(normals)
     signed = abs(float(cluster_signs(len(around), edges, coupling).mean())) > AGREED
     best, score = np.ones(len(around)), WORTH * NEAR
     for place in _places(around.points, lines, signed):

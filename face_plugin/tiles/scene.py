@@ -30,7 +30,7 @@ RING_WIDTH = 6.0
 # Width of the part of it in which normals move.
 NEAR = 3.0
 # Size of the voxels that are left a point, as a share of the distance to the tile.
-SHARE = 0.2
+THINNED = 0.2
 _SHEETS = tuple(field.name for field in dataclasses.fields(Sheets))
 _FIELD = tuple(field.name for field in dataclasses.fields(FieldAtPoints))
 
@@ -81,7 +81,7 @@ def scene(store: Store, tile: int) -> Scene:
     """
     near = surroundings(store, tile, RING_WIDTH)
     reach = RING_WIDTH * near.spacing
-    middle = store.within(near.lower - store.voxel / SHARE, near.upper + store.voxel / SHARE)
+    middle = store.within(near.lower - store.voxel / THINNED, near.upper + store.voxel / THINNED)
     far = _far(store.folder, store.key)
 
     def outside(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -89,7 +89,7 @@ def scene(store: Store, tile: int) -> Scene:
 
     distance = outside(middle.points)
     rows = _thinned(middle.points, distance, reach)
-    beyond = np.flatnonzero(outside(far["points"]) > store.voxel / SHARE)
+    beyond = np.flatnonzero(outside(far["points"]) > store.voxel / THINNED)
     beyond = beyond[_thinned(far["points"][beyond], outside(far["points"][beyond]), reach)]
 
     tiles = np.concatenate([near.tile, middle.tile[rows]])
@@ -140,6 +140,6 @@ def _thinned(points: NDArray[np.float64], distance: NDArray[np.float64], reach: 
     while near <= farthest:
         # `distance` counts from the box, `near` from the tile in it.
         octave = np.flatnonzero((distance > near - reach) & (distance <= 2 * near - reach))
-        rows.append(octave[nearest_to_centres(points[octave], np.full(3, -1.0), SHARE * near)])
+        rows.append(octave[nearest_to_centres(points[octave], np.full(3, -1.0), THINNED * near)])
         near *= 2.0
     return np.concatenate(rows)

@@ -23,7 +23,7 @@ from face_plugin.faraday.balls import Balls
 from face_plugin.faraday.domain import Box, Filling
 from face_plugin.faraday.meshers import CageMesh
 from face_plugin.faraday.meshers.boundary import ball_volumes, oriented
-from face_plugin.faraday.meshers.signals import same_signals
+from face_plugin.faraday.meshers.kept_signals import same_signals
 
 __all__ = ["delaunay_mesh", "gmsh_loads", "tetrahedralize"]
 

@@ -81,7 +81,9 @@ def find_stations(seen: RayDensity) -> Sensors | None:
     found, unexplained = next(one for one in tried if FEWER * one[1] <= min(rest for _, rest in tried))
     if unexplained >= EXPLAINED * seen.spread:
         return None
-    return Sensors(_at_its_height(seen, singles, found, unexplained, extent) if len(found) == 1 else found)
+    if len(found) > 1:
+        return Sensors(_on_one_side(seen, found, unexplained))
+    return Sensors(_at_its_height(seen, singles, found, unexplained, extent))
 
 
 def believed_stations(
@@ -197,6 +199,28 @@ def _climbed(
     return places, least
 
 
+def _ground(seen: RayDensity) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Find a place (3,) and the unit normal (3,) of the plane where points lie densest."""
+    dense = _densest(seen)
+    return seen.points[dense].mean(axis=0), np.linalg.eigh(seen.across[dense].T @ seen.across[dense])[1][:, 2]
+
+
+def _worth(seen: RayDensity, few: Neighbourhood, places: NDArray[np.float64], rest: float) -> float:
+    """How many points are seen from places (k, 3), times how much of their density is explained."""
+    return float(sights(few, Sensors(places), seen.across).any(axis=1).mean()) * (1.0 - rest / seen.spread)
+
+
+def _on_one_side(seen: RayDensity, stations: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+    """Mirror stations (k, 3) to one side of the ground, where that explains the density as well."""
+    ground, upright = _ground(seen)
+    height = (stations - ground) @ upright
+    sets = [stations + np.multiply.outer(sign * np.abs(height) - height, upright) for sign in (1.0, -1.0)]
+    few = Neighbourhood(seen.points)
+    rest = [float(seen.left(seen.expected(places).sum(axis=0))) for places in sets]
+    kept = [(places, left) for places, left in zip(sets, rest, strict=True) if FEWER * left <= least]
+    return max(kept, key=lambda one: _worth(seen, few, *one))[0] if kept else stations
+
+
 def _at_its_height(
     seen: RayDensity,
     singles: list[tuple[NDArray[np.float64], float]],
@@ -206,18 +230,13 @@ def _at_its_height(
 ) -> NDArray[np.float64]:
     """Of places (1, 3) that explain the density as well as the best, the one that sees most, and most squarely."""
     # On the ground the area goes with d^3 over the height: that one is not told by it, nor is above from below.
-    dense = _densest(seen)
-    upright = np.linalg.eigh(seen.across[dense].T @ seen.across[dense])[1][:, 2]
-    foot = best[0] - ((best[0] - seen.points[dense].mean(axis=0)) @ upright) * upright
+    ground, upright = _ground(seen)
+    foot = best[0] - ((best[0] - ground) @ upright) * upright
     others = foot + np.multiply.outer([*HEIGHTS, *np.negative(HEIGHTS)], extent * upright)
     places = np.vstack([*(place for place, _ in singles), others])
     rest = np.concatenate([[left for _, left in singles], seen.left(seen.expected(others))])
     few = Neighbourhood(seen.points)
-
-    def worth(place: NDArray[np.float64], rest: float) -> float:
-        return float(sights(few, Sensors(place), seen.across).any(axis=1).mean()) * (1.0 - rest / seen.spread)
-
     enough = max(NEARLY * least, ENOUGH * seen.spread)
     kept = [one for one in zip(places, rest, strict=True) if one[1] <= enough]
-    best_kept: NDArray[np.float64] = max(kept, key=lambda one: worth(*one))[0]
+    best_kept: NDArray[np.float64] = max(kept, key=lambda one: _worth(seen, few, one[0][None], one[1]))[0]
     return best_kept[None]

@@ -18,7 +18,7 @@ from face_plugin.sides import enclosure
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import borne_out, open_parts, parts, told_by
-from face_plugin.sides.patches import planes_of
+from face_plugin.sides.patches import lines_at
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.sights import sights
@@ -47,14 +47,14 @@ class Reading:
     def sights(self) -> NDArray[np.float64] | None:
         """Directions (m, 3) in which sensors saw the distinct points: those given, or those that density tells."""
         if self.sensors is not None:
-            return sights(self.around, self.sensors, planes_of(self.around).lines)
+            return sights(self.around, self.sensors, lines_at(self.around))
         if self.around.plane or self.plane is not None or self.params.angles == "field":
             return None
         # A closed cloud is asked only where something is so dim that it lies inside a body, or stands in a room.
         closed = not is_open(self.seen.difference)
         if closed and not enclosure.dim(self.seen.strength).any():
             return None
-        found = believed_stations(self.around, planes_of(self.around), closed=closed)
+        found = believed_stations(self.around, closed=closed)
         return None if found is None else found[1]
 
     @cached_property

@@ -10,7 +10,6 @@ from face_plugin import Execution, Params, Side, estimate_normals, shapes
 from face_plugin.cloud import prepare
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.shapes.scans import camera_rays, ring_rays, scan_boxes, sphere_rays
-from face_plugin.sides.patches import planes_of
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.stations import believed_stations
 
@@ -39,7 +38,7 @@ def scan(rays, seed=0):
 def found(points):
     cloud = prepare(points)
     around = Neighbourhood(cloud.points)
-    believed = believed_stations(around, planes_of(around))
+    believed = believed_stations(around)
     return None if believed is None else cloud.frame.from_unit(np.asarray(believed[0].viewpoints))
 
 
@@ -152,5 +151,5 @@ def test_many_views_are_not_taken_for_few():
     views = np.column_stack([12 * np.cos(turn), 12 * np.sin(turn), np.full(10, 1.8)])
     points = scan_boxes(YARD, views, RAYS["all round"], 9000, np.random.default_rng(0)).points
     around = Neighbourhood(points)
-    believed = believed_stations(around, planes_of(around))
+    believed = believed_stations(around)
     assert believed is None or ((believed[1] * [0, 0, 1]).sum(axis=1)[points[:, 2] < 0.01] > 0).mean() > 0.99

@@ -111,8 +111,8 @@ def planes_of(around: Neighbourhood) -> Planes:
     return Planes(lines, edges, couplings(around.points, lines, edges) * trust[edges.first] * trust[edges.second])
 
 
-def lines_at(around: Neighbourhood, some: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Lines (m, 3) of the planes of some points (m,), as `planes_of` has them of all.
+def lines_at(around: Neighbourhood, some: slice | NDArray[np.intp] = slice(None)) -> NDArray[np.float64]:
+    """Lines (m, 3) of the planes of some points (m,), or of all, as `planes_of` has them.
 
     Examples
     --------

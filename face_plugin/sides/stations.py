@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.facing import facing
-from face_plugin.sides.patches import Planes
+from face_plugin.sides.patches import lines_at, planes_of
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sights import sights
@@ -87,7 +87,7 @@ def find_stations(seen: RayDensity) -> Sensors | None:
 
 
 def believed_stations(
-    around: Neighbourhood, planes: Planes, seen: RayDensity | None = None, *, closed: bool = False
+    around: Neighbourhood, seen: RayDensity | None = None, *, closed: bool = False
 ) -> tuple[Sensors, NDArray[np.float64]] | None:
     """Find the stations that the density of a cloud tells, and the directions in which points were seen from them.
 
@@ -97,8 +97,6 @@ def believed_stations(
     ----------
     around : Neighbourhood
         Of n points.
-    planes : Planes
-        Those of `around`.
     seen : RayDensity, optional
         Some of the points as they were scanned, where `around` is thinned.
     closed : bool, default: False
@@ -113,20 +111,18 @@ def believed_stations(
     Examples
     --------
     >>> from face_plugin.shapes import sphere
-    >>> from face_plugin.sides.patches import planes_of
-    >>> around = Neighbourhood(sphere(1000).points)
-    >>> believed_stations(around, planes_of(around)) is None
+    >>> believed_stations(Neighbourhood(sphere(1000).points)) is None
     True
     """
-    lines, edges, coupling = planes
     if seen is None:
         some = np.unique(np.linspace(0, len(around) - 1, LOOKED_WITH).astype(np.intp))
-        seen = RayDensity.of(around, lines[some], some)
+        seen = RayDensity.of(around, lines_at(around, some), some)
     if closed and seen.spread < CHANCE:
         return None
     stations = find_stations(seen)
     if stations is None:
         return None
+    lines, edges, coupling = planes_of(around)
     toward = sights(around, stations, lines)
     evidence = facing(lines, toward)
     says = coupling * evidence[edges.first] * evidence[edges.second]

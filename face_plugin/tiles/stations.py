@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.enclosure import dim
-from face_plugin.sides.patches import lines_at, planes_of
+from face_plugin.sides.patches import lines_at
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.stations import LOOKED_WITH, believed_stations
@@ -63,5 +63,5 @@ def stations_of(store: Store) -> Sensors | None:
         if closed and not dim(far["strength"]).any():
             return None
         around = Neighbourhood(far["points"])
-    believed = believed_stations(around, planes_of(around), seen, closed=closed)
+    believed = believed_stations(around, seen, closed=closed)
     return None if believed is None else believed[0]

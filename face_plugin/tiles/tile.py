@@ -27,7 +27,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.enclosure import enclosed
-from face_plugin.sides.patches import planes_of
+from face_plugin.sides.patches import lines_at
 from face_plugin.sides.sheets import find_sheets
 from face_plugin.sides.sights import sights
 from face_plugin.sides.strays import find_strays
@@ -181,7 +181,7 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         seen = scene(store, tile)
         around = Neighbourhood(seen.points)
     with clock("refine"):
-        seen_by = None if store.sensors is None else sights(around, store.sensors, planes_of(around).lines)
+        seen_by = None if store.sensors is None else sights(around, store.sensors, lines_at(around))
         normals = orient(
             around, seen.field, store.params, plane=store.plane, sheets=seen.sheets, moving=seen.near, sights=seen_by
         )

@@ -124,6 +124,20 @@ def test_what_lies_inside_a_body_stays_inside():
     assert (result.interior == nested.interior).mean() > 0.99
 
 
+def test_uneven_samplings_of_a_body_were_not_scanned_from_within():
+    # Rays even in angle from the middle of a long body that holds another, and a ball stretched threefold.
+    rng = np.random.default_rng(0)
+    rays = rng.normal(size=(2, 8000, 3))
+    rays /= np.linalg.norm(rays, axis=2, keepdims=True)
+    long = np.array([2.0, 1.0, 1.0])
+    inner = 0.4 * rays[1, :800]
+    for outer in (rays[0] / np.linalg.norm(rays[0] / long, axis=1)[:, None], rays[0] * [3.0, 1.0, 1.0]):
+        result = estimate_normals(np.vstack([outer, inner]), filter_interior=True)
+        assert ((result.normals[:8000] * outer).sum(axis=1) > 0).all()
+        assert result.interior[8000:].all()
+        assert not result.interior[:8000].any()
+
+
 def test_rows_of_a_torus_face_outward():
     # The density is that of rows seen from the middle, from which half of them is in sight.
     around, turn = np.meshgrid(2 * np.pi * np.arange(90) / 90, 2 * np.pi * np.arange(220) / 220, indexing="ij")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+from scipy.optimize import least_squares, nnls
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.facing import facing
@@ -82,7 +82,8 @@ def find_stations(seen: RayDensity) -> Sensors | None:
     if unexplained >= EXPLAINED * seen.spread:
         return None
     if len(found) > 1:
-        return Sensors(_on_one_side(seen, found, unexplained))
+        found = _on_one_side(seen, found, unexplained)
+        return Sensors(_adjusted(summed, found, unexplained, extent))
     return Sensors(_at_its_height(seen, singles, found, unexplained, extent))
 
 
@@ -215,6 +216,21 @@ def _on_one_side(seen: RayDensity, stations: NDArray[np.float64], least: float) 
     rest = [float(seen.left(seen.expected(places).sum(axis=0))) for places in sets]
     kept = [(places, left) for places, left in zip(sets, rest, strict=True) if FEWER * left <= least]
     return max(kept, key=lambda one: _worth(seen, few, *one))[0] if kept else stations
+
+
+def _adjusted(seen: RayDensity, stations: NDArray[np.float64], least: float, extent: float) -> NDArray[np.float64]:
+    """Move stations (k, 3) all together to where the logarithms fit best, unless by medians less is explained there."""
+
+    def off(unknown: NDArray[np.float64]) -> NDArray[np.float64]:
+        places = unknown[:-1].reshape(stations.shape)
+        return np.asarray(seen.area + np.log(seen.expected(places).sum(axis=0)) - unknown[-1])
+
+    factor = np.median(off(np.append(stations, 0.0)))
+    scale = np.append(np.full(stations.size, FIRST_STEP * extent), seen.spread)
+    fit = least_squares(off, np.append(stations, factor), loss="soft_l1", f_scale=CHANCE, x_scale=scale, max_nfev=MOVES)
+    places = fit.x[:-1].reshape(stations.shape)
+    rest = float(seen.left(seen.expected(places).sum(axis=0)))
+    return np.asarray(places) if FEWER * rest <= least else stations
 
 
 def _at_its_height(

@@ -157,7 +157,11 @@ def _several(seen: RayDensity, places: NDArray[np.float64], extent: float) -> li
     """Find sets of two to `MOST` stations, and what each leaves unexplained, from places (k, 3) to start at."""
     few = seen.part(slice(None, None, 2))
     share = (np.exp(few.area) * few.expected(places)).T
-    strength = nnls(share, np.ones(len(share)), maxiter=10 * len(places))[0] * share.mean(axis=0)
+    try:
+        strength = nnls(share, np.ones(len(share)), maxiter=10 * len(places))[0] * share.mean(axis=0)
+    except RuntimeError:
+        # It came to no end: nothing is told then.
+        return []
     chosen: list[int] = []
     for k in np.argsort(-strength):
         if all(np.linalg.norm(places[k] - places[other]) > APART * extent for other in chosen):
@@ -240,7 +244,7 @@ def _at_its_height(
     least: float,
     extent: float,
 ) -> NDArray[np.float64]:
-    """Of places (1, 3) that explain the density as well as the best, the one that sees most, and most squarely."""
+    """Of places (1, 3) that explain the density as well as the best, the one that sees most."""
     # On the ground the area goes with d^3 over the height: that one is not told by it, nor is above from below.
     ground, upright = _ground(seen)
     foot = best[0] - ((best[0] - ground) @ upright) * upright

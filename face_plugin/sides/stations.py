@@ -42,8 +42,8 @@ BEST, FIRST_STEP, LAST_STEP, ROUGHLY, MOVES = 2, 0.1, 0.002, 0.01, 100
 # Places tried above and below one in EVERY of the densest of the points, which are one in DENSEST, in extents.
 DENSEST, EVERY, HEIGHTS = 20, 5, (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2)
 # Places that explain it nearly as well, as those of other heights over the ground do, or well enough, are told apart by
-# how many points are seen from them.
-NEARLY, ENOUGH = 2.0, 0.2
+# how many points are seen from them, and where that is alike, by how squarely.
+NEARLY, ENOUGH, ALIKE = 2.0, 0.2, 0.97
 
 
 def find_stations(seen: RayDensity) -> Sensors | None:
@@ -206,9 +206,11 @@ def _ground(seen: RayDensity) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     return seen.points[dense].mean(axis=0), np.linalg.eigh(seen.across[dense].T @ seen.across[dense])[1][:, 2]
 
 
-def _worth(seen: RayDensity, few: Neighbourhood, places: NDArray[np.float64], rest: float) -> float:
-    """How many points are seen from places (k, 3), times how much of their density is explained."""
-    return float(sights(few, Sensors(places), seen.across).any(axis=1).mean()) * (1.0 - rest / seen.spread)
+def _worth(seen: RayDensity, few: Neighbourhood, places: NDArray[np.float64], rest: float) -> tuple[float, float]:
+    """How many points are seen from places (k, 3), times how much of their density is explained; and how squarely."""
+    toward = sights(few, Sensors(places), seen.across)
+    share = float(toward.any(axis=1).mean()) * (1.0 - rest / seen.spread)
+    return share, float(np.abs(facing(seen.across, toward)).mean())
 
 
 def _on_one_side(seen: RayDensity, stations: NDArray[np.float64], least: float) -> NDArray[np.float64]:
@@ -244,7 +246,10 @@ def _at_its_height(
     least: float,
     extent: float,
 ) -> NDArray[np.float64]:
-    """Of places (1, 3) that explain the density as well as the best, the one that sees most."""
+    """Of places that explain the density as well as the best (1, 3) and see as much, the one that sees most squarely.
+
+    On the side of the ground from which most is seen.
+    """
     # On the ground the area goes with d^3 over the height: that one is not told by it, nor is above from below.
     ground, upright = _ground(seen)
     foot = best[0] - ((best[0] - ground) @ upright) * upright
@@ -253,6 +258,9 @@ def _at_its_height(
     rest = np.concatenate([[left for _, left in singles], seen.left(seen.expected(others))])
     few = Neighbourhood(seen.points)
     enough = max(NEARLY * least, ENOUGH * seen.spread)
-    kept = [one for one in zip(places, rest, strict=True) if one[1] <= enough]
-    best_kept: NDArray[np.float64] = max(kept, key=lambda one: _worth(seen, few, one[0][None], one[1]))[0]
-    return best_kept[None]
+    kept = np.flatnonzero(rest <= enough)
+    worth = np.array([_worth(seen, few, places[k : k + 1], rest[k]) for k in kept])
+    most = int(np.argmax(worth[:, 0]))
+    above = (places[kept] - ground) @ upright > 0
+    alike = (worth[:, 0] >= ALIKE * worth[most, 0]) & (above == above[most])
+    return places[kept[[int(np.argmax(np.where(alike, worth[:, 1], 0.0)))]]]

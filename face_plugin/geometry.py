@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from face_plugin.compiled import compiled
 from face_plugin.threads import KDTree
 
-__all__ = ["local_spacing", "log_ramp", "ramp", "thin", "unit"]
+__all__ = ["evenly", "lattice", "local_spacing", "log_ramp", "ramp", "thin", "unit"]
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -24,6 +24,28 @@ def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(length > 0, vectors / np.where(length > 0, length, 1.0), np.eye(vectors.shape[1])[-1])
+
+
+def evenly(n: int, count: int) -> NDArray[np.intp]:
+    """At most `count` of n rows, ascending, as far apart as they can be.
+
+    Examples
+    --------
+    >>> evenly(9, 3)
+    array([0, 4, 8])
+    """
+    return np.unique(np.linspace(0, n - 1, count).astype(np.intp))
+
+
+def lattice(wide: int) -> NDArray[np.float64]:
+    """Places (wide^3, 3) of a lattice over the cube from -1 to 1.
+
+    Examples
+    --------
+    >>> lattice(2).shape
+    (8, 3)
+    """
+    return np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, wide)], indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def local_spacing(points: NDArray[np.float64], neighbours: int = 6) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
+from face_plugin.geometry import evenly, lattice
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.facing import facing
 from face_plugin.sides.patches import lines_at, planes_of
@@ -116,7 +117,7 @@ def believed_stations(
     True
     """
     if seen is None:
-        some = np.unique(np.linspace(0, len(around) - 1, LOOKED_WITH).astype(np.intp))
+        some = evenly(len(around), LOOKED_WITH)
         seen = RayDensity.of(around, lines_at(around, some), some)
     if closed and seen.spread < CHANCE:
         return None
@@ -135,11 +136,8 @@ def believed_stations(
 def _over_the_box(seen: RayDensity, extent: float) -> list[NDArray[np.float64]]:
     """Places (k, 3) over the box of the points, and around it."""
     lower, upper = seen.points.min(axis=0), seen.points.max(axis=0)
-    boxes = []
-    for count, wider in zip(PLACES, AROUND, strict=True):
-        steps = np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, count)], indexing="ij"), axis=-1).reshape(-1, 3)
-        boxes.append((lower + upper) / 2 + ((upper - lower) / 2 + wider * extent) * steps)
-    return boxes
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+    return [middle + (half + wider * extent) * lattice(wide) for wide, wider in zip(PLACES, AROUND, strict=True)]
 
 
 def _near_the_densest(seen: RayDensity, extent: float) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.geometry import evenly, lattice
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import better_signs, cluster_signs
 from face_plugin.sides.facing import SIGHT, facing
@@ -114,7 +115,7 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: boo
     Tried are 26 directions from afar, and places within the box and around it; the best of each then move for as long
     as they get better, so that one near the sensor of a single view ends there.
     """
-    some = np.unique(np.linspace(0, len(points) - 1, LOOKED_WITH).astype(np.intp))
+    some = evenly(len(points), LOOKED_WITH)
     around, few = Neighbourhood(points[some]), lines[some]
 
     def share(place: Sensors) -> float:
@@ -123,11 +124,11 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: boo
     def one_sided(place: Sensors) -> float:
         return abs(float(facing(few, sights(around, place, few)).mean()))
 
-    directions = _steps(3)[_steps(3).any(axis=1)]
+    directions = lattice(3)[lattice(3).any(axis=1)]
     lower, upper = points.min(axis=0), points.max(axis=0)
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     far = max(directions, key=lambda direction: share(Sensors(up=direction)))
-    starts = np.vstack([middle + WITHIN * half * _steps(WIDE), middle + half.max() * directions])
+    starts = np.vstack([middle + WITHIN * half * lattice(WIDE), middle + half.max() * directions])
     worth = one_sided if signed else share
     starts = starts[np.argsort([-worth(Sensors(start)) for start in starts])]
     apart = np.linalg.norm(starts - starts[0], axis=1) > APART * half.max()
@@ -136,11 +137,6 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: boo
     places = [(share(Sensors(up=far)), Sensors(up=far)), (share(Sensors(up=-far)), Sensors(up=-far))]
     places += [(NEAR * worth(Sensors(place)), Sensors(place)) for place in near]
     return [place for _, place in sorted(places, key=lambda found: -found[0])]
-
-
-def _steps(wide: int) -> NDArray[np.float64]:
-    """Corners (wide^3, 3) of a lattice over the cube from -1 to 1."""
-    return np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, wide)], indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _climbed(place: NDArray[np.float64], share: Callable[[Sensors], float], extent: float) -> NDArray[np.float64]:

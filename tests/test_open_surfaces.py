@@ -14,14 +14,14 @@ from face_plugin.io import CloudFile, write_cloud
 from face_plugin.surface import poisson_reconstruction
 from face_plugin.trimming import AUTO_DISTANCE, trimmed_by_distance
 
-TERRAIN = examples.load("terrain", 4000)
+TERRAIN = examples.load("terrain", 2500)
 BALL = shapes.sphere(2500, seed=1)
 # A cut is linear along an edge, and the distance to the points bends: measured 1.11 to 1.14.
 BENT = 1.2
-TILES = Execution(tile_points=2000, engine="serial")
+TILES = Execution(tile_points=1250, engine="serial")
 
 
-def spacings(points, surface, depth=8):
+def spacings(points, surface, depth):
     """How far the surface's vertices lie from the points, and the points from these: in spacings."""
     spacing = np.maximum(local_spacing(points), 1.1 * np.ptp(points, axis=0).max() / 2**depth)
     apart, near = cKDTree(points).query(surface.vertices, k=24)
@@ -36,13 +36,13 @@ def ball_over_floor(gap=0.5):
 
 @pytest.mark.parametrize("options", [{}, {"up": (0, 0, 1)}, {"execution": TILES}, {"backend": "pymeshlab"}])
 def test_a_terrain_ends_where_its_points_do(options):
-    surface = reconstruct(TERRAIN.points, **options)
+    surface = reconstruct(TERRAIN.points, depth=7, **options)
     assert surface.result.open.all()
-    away, back = spacings(TERRAIN.points, surface)
+    away, back = spacings(TERRAIN.points, surface, 7)
     assert away.max() < BENT * AUTO_DISTANCE
     assert (back < 1).mean() > 0.99
-    whole = reconstruct(TERRAIN.points, trim_distance=None, **options)
-    assert spacings(TERRAIN.points, whole)[0].max() > 1.5 * AUTO_DISTANCE
+    whole = reconstruct(TERRAIN.points, depth=7, trim_distance=None, **options)
+    assert spacings(TERRAIN.points, whole, 7)[0].max() > 1.5 * AUTO_DISTANCE
     assert set(np.unique(surface.faces)) == set(range(len(surface.vertices)))
     assert surface.densities is None or len(surface.densities) == len(surface.vertices)
 

@@ -10,7 +10,9 @@ from face_plugin import Execution, Params, Side, estimate_normals, shapes
 from face_plugin.cloud import prepare
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.shapes.scans import camera_rays, ring_rays, scan_boxes, sphere_rays
+from face_plugin.sides import stations as search
 from face_plugin.sides.ray_density import RayDensity
+from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.stations import believed_stations
 
 YARD = [
@@ -46,8 +48,10 @@ def found(points):
 def test_the_station_of_a_single_view_is_found(rays):
     points, _, station = scan(rays)
     # Of 40 m: its place over the ground is told well, and its height little. Measured: 0.2 to 3 m.
-    assert len(found(points)) == 1
-    assert np.linalg.norm(found(points)[0] - station) < 5.0
+    stations = found(points)
+    # Two beside one another may explain the chance in it a little better than one.
+    assert len(stations) <= 2
+    assert np.linalg.norm(stations - station, axis=1).max() < 5.0
 
 
 @pytest.mark.parametrize("rays", RAYS)
@@ -101,6 +105,25 @@ def test_what_stands_in_a_closed_room_is_not_taken_for_what_lies_inside_a_body(v
     result = estimate_normals(points, filter_interior=True)
     assert ((result.normals * normals).sum(axis=1) > 0).mean() > 0.995
     assert not result.interior.any()
+
+
+def test_a_mirror_image_behind_a_wall_is_left_out(monkeypatch):
+    points, _, true = room(2)
+    cloud = prepare(points)
+    # From behind the wall at x = 0, which hides all else from it.
+    turn = Rotation.random(random_state=0).as_matrix()
+    places = cloud.frame.to_unit(np.vstack([true, [[-0.8, 3.4, 1.4]] @ turn.T]))
+    monkeypatch.setattr(search, "find_stations", lambda seen: Sensors(places))
+    believed = believed_stations(Neighbourhood(cloud.points))
+    assert np.array_equal(believed[0].viewpoints, places[:2])
+
+
+def test_strays_do_not_tell_otherwise():
+    points, normals, _ = scan("camera", 1)
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    strays = np.random.default_rng(0).uniform(lower - (upper - lower), 2 * upper - lower, (len(points) // 50, 3))
+    result = estimate_normals(np.concatenate([points, strays]))
+    assert ((result.normals[: len(points)] * normals).sum(axis=1) > 0).mean() > 0.99
 
 
 def test_tiles_find_the_stations_together():

@@ -112,9 +112,9 @@ def scan_boxes(
     rays : (r, 3) float64
         Unit directions.
     n : int
-        How many of the hits to keep, evenly taken.
+        How many of the hits to keep.
     rng : numpy.random.Generator
-        Of the noise.
+        Of the noise, and of which hits are kept: every so many of a spiral would be streaks.
     noise : float
         Standard deviation along the ray.
     reach : float
@@ -140,7 +140,7 @@ def scan_boxes(
     met = np.flatnonzero(distance < reach)
     if len(met) < n:
         raise ValueError(f"n: found {n}, allowed is at most the {len(met)} rays that hit something")
-    kept = met[np.arange(n) * len(met) // n]
+    kept = np.sort(rng.choice(met, n, replace=False))
     measured = distance[kept] + noise * rng.normal(size=n)
     return Scan(start[kept] + measured[:, None] * direction[kept], normals[kept], views)
 

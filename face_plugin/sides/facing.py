@@ -1,7 +1,7 @@
 """The sides that follow from what sensors saw.
 
-A point that a sensor saw faces it: the space between was free. Each point leans to the sensors that see it, by the
-cosine of the angle to its line; points that none sees, and grazing ones, take the side of the sheet that they are part
+A point that a sensor saw faces it: the space between was free. Each point leans to the sensors that see it, the more
+the less it is seen at a slant; points that none sees, and grazing ones, take the side of the sheet that they are part
 of.
 """
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import better_signs, cluster_signs
+from face_plugin.sides.cuts import cut_signs
 from face_plugin.sides.graph import couplings, neighbours_around
 from face_plugin.sides.patches import Planes, planes_of
 
@@ -20,6 +21,9 @@ __all__ = ["SIGHT", "facing", "resettled", "sides_by_sensors"]
 # Weight of a line of sight next to the couplings of a point to its neighbours, which are 1 at most each: a few false
 # sights, through gaps, must not tear a sheet.
 SIGHT = 0.5
+# Lines seen at this sine of the angle to their planes count 0.7 of those seen face on: planes are known to about as much,
+# and seen more squarely than that, a far floor faces the sensor as surely as a near wall.
+GRAZING = 0.1
 # Weight of the side that a line was given before its angle was known better.
 KEPT = 0.25
 
@@ -44,7 +48,8 @@ def sides_by_sensors(
     seen : (n, 3) float64
         As `face_plugin.sides.sights.sights` has it.
     blind : (n, 3) float64, optional
-        Normals found without sensors: where no sensor saw, they count, as far as they agree with what was seen.
+        Normals found without sensors: where no sensor saw, they count, as far as they agree with what was seen
+        elsewhere.
     planes : Planes, optional
         Those of `around`, where they are known.
 
@@ -60,22 +65,25 @@ def sides_by_sensors(
     True
     """
     lines, edges, coupling = planes or planes_of(around)
-    sign = cluster_signs(len(around), edges, coupling, _evidence(lines, seen, blind))
+    evidence = _evidence(lines, seen, blind)
+    sign = cut_signs(cluster_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
     return np.asarray(lines * sign[:, None])
 
 
 def _evidence(
     lines: NDArray[np.float64], seen: NDArray[np.float64], blind: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Weigh what tells the sides (n,) of lines: sights, and normals found blind if the sights bear these out.
+    """Weigh what tells the sides (n,) of lines: sights, and elsewhere normals found blind if the sights bear these out.
 
     A body seen from outside is what its field says it is, also where no sensor looks; a room is its opposite.
     """
     evidence = facing(lines, seen)
+    evidence /= np.hypot(evidence, GRAZING)
     if blind is not None:
         agreed = facing(blind, seen)
         borne_out = max(float(agreed.sum() / max(np.abs(agreed).sum(), np.finfo(float).tiny)), 0.0)
-        evidence = evidence + borne_out**2 * np.einsum("nd,nd->n", lines, blind)
+        found = borne_out**2 * np.einsum("nd,nd->n", lines, blind)
+        evidence = np.where(seen.any(axis=1), evidence, found)
     return np.asarray(SIGHT * evidence)
 
 
@@ -88,5 +96,6 @@ def resettled(
     """Settle the sides of normals (n, 3) of better angles again, by what was seen (n, 3) and along sheets."""
     edges = neighbours_around(around, normals)
     coupling = couplings(around.points, normals, edges)
-    sign = better_signs(len(around), edges, coupling, _evidence(normals, seen, blind) + KEPT)
+    evidence = _evidence(normals, seen, blind) + KEPT
+    sign = cut_signs(better_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
     return np.asarray(normals * sign[:, None])

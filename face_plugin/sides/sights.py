@@ -129,22 +129,34 @@ def _in_the_way(
 
 
 def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sum (n, 3) of the unit directions in which each point is seen; of length 0 where no sensor sees it.
+    """Sum (n, 3) of the directions in which each point is seen; of length 0 where no sensor sees it.
+
+    The direction to the nearest viewpoint that sees a point is of length 1, and those to others are shorter by the squares
+    of the distances: a sensor puts points on a surface by ``cos(angle) / distance^2``, and a thin wall that is seen from
+    both sides was scanned from where it has most points.
 
     `lines` (n, 3) are unit normals of either sign, roughly, such as those of planes.
     """
     points = around.points
-    total = np.zeros_like(points)
+    total, nearest = np.zeros_like(points), np.full(len(points), np.inf)
     views = _views(points, sensors)
     told = np.zeros(len(points), dtype=np.bool_)
     if sensors.seen_from is not None:
         rows = np.asarray(sensors.seen_from)
         told = rows >= 0
         total[told] = _toward(points[told], views[rows[told]])
-    if not told.all():
-        for view in _spread(views):
-            seen = visible(points, around.spacing, view, lines) & ~told
-            total[seen] += _toward(points[seen], view)
+    if told.all():
+        return total
+    near = len(views) - (sensors.up is not None)
+    for view in _spread(views[:near]):
+        seen = visible(points, around.spacing, view, lines) & ~told
+        squared = np.sum((points[seen] - view) ** 2, axis=1)
+        total[seen] += _toward(points[seen], view) / squared[:, None]
+        nearest[seen] = np.minimum(nearest[seen], squared)
+    total[~told] *= np.where(np.isfinite(nearest), nearest, 1.0)[~told, None]
+    for view in views[near:]:
+        seen = visible(points, around.spacing, view, lines) & ~told
+        total[seen] += _toward(points[seen], view)
     return total
 
 

@@ -33,6 +33,8 @@ CHANCE = 0.37
 MOST, FEWER = 4, 0.95
 # Points that places are looked for with.
 LOOKED_WITH = 2000
+# The box that they are looked for in leaves out as many as this, or strays that are left would stretch it.
+WITHIN = (0.01, 0.99)
 # Places tried along each axis, over the box and so much of its extent around it.
 PLACES, AROUND = (9, 5, 5), (0.0, 0.25, 1.5)
 # Where several are looked for, the search starts with so many, so far apart in extents.
@@ -45,6 +47,8 @@ DENSEST, EVERY, HEIGHTS = 20, 5, (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2
 # Places that explain it nearly as well, as those of other heights over the ground do, or well enough, are told apart by
 # how many points are seen from them, and where that is alike, by how squarely.
 NEARLY, ENOUGH, ALIKE = 2.0, 0.2, 0.97
+# As much is seen of flat ground from its mirror image: twice as squarely counts as 1.4 % more in sight.
+SQUARELY = 0.02
 
 
 def find_stations(seen: RayDensity) -> Sensors | None:
@@ -67,8 +71,9 @@ def find_stations(seen: RayDensity) -> Sensors | None:
     >>> bool(np.allclose(np.abs(station.viewpoints), [[0.0, 0.0, 1.0]], atol=0.2))  # it, or its mirror image
     True
     """
-    extent = float(np.ptp(seen.points, axis=0).max())
-    places = [*_over_the_box(seen, extent), _near_the_densest(seen, extent)]
+    box = np.quantile(seen.points, WITHIN, axis=0)
+    extent = float(np.ptp(box, axis=0).max())
+    places = [*_over_the_box(box, extent), _near_the_densest(seen, extent)]
     singles = []
     for some in places:
         rest = seen.left(seen.expected(some))
@@ -125,6 +130,7 @@ def believed_stations(
     if stations is None:
         return None
     lines, edges, coupling = planes_of(around)
+    stations = _in_accord(around, stations, lines)
     toward = sights(around, stations, lines)
     evidence = facing(lines, toward)
     says = coupling * evidence[edges.first] * evidence[edges.second]
@@ -133,10 +139,29 @@ def believed_stations(
     return stations, toward
 
 
-def _over_the_box(seen: RayDensity, extent: float) -> list[NDArray[np.float64]]:
-    """Places (k, 3) over the box of the points, and around it."""
-    lower, upper = seen.points.min(axis=0), seen.points.max(axis=0)
-    middle, half = (lower + upper) / 2, (upper - lower) / 2
+def _in_accord(around: Neighbourhood, stations: Sensors, lines: NDArray[np.float64]) -> Sensors:
+    """Leave out stations that see most of what they see from the other side than all others do.
+
+    One of them is the mirror image, behind a wall, of a true one in front of it: 86 % and more of what it sees is seen
+    from the other side, and of what true ones see 8 % and less.
+    """
+    places = np.atleast_2d(np.asarray(stations.viewpoints))
+    if len(places) == 1:
+        return stations
+    faced = np.array([facing(lines, sights(around, Sensors(place), lines)) for place in places])
+    while True:
+        others = faced.sum(axis=0) - faced
+        seen = np.abs(faced) * (others != 0)
+        against = (seen * (faced * others < 0)).sum(axis=1) / np.maximum(seen.sum(axis=1), np.finfo(float).tiny)
+        worst = int(np.argmax(against))
+        if against[worst] <= 0.5:
+            return Sensors(places)
+        places, faced = np.delete(places, worst, axis=0), np.delete(faced, worst, axis=0)
+
+
+def _over_the_box(box: NDArray[np.float64], extent: float) -> list[NDArray[np.float64]]:
+    """Places (k, 3) over a box, of which opposite corners (2, 3) are given, and around it."""
+    middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
     return [middle + (half + wider * extent) * lattice(wide) for wide, wider in zip(PLACES, AROUND, strict=True)]
 
 
@@ -258,7 +283,7 @@ def _at_its_height(
     enough = max(NEARLY * least, ENOUGH * seen.spread)
     kept = np.flatnonzero(rest <= enough)
     worth = np.array([_worth(seen, few, places[k : k + 1], rest[k]) for k in kept])
-    most = int(np.argmax(worth[:, 0]))
     above = (places[kept] - ground) @ upright > 0
-    alike = (worth[:, 0] >= ALIKE * worth[most, 0]) & (above == above[most])
+    side = above == above[int(np.argmax(worth[:, 0] * worth[:, 1] ** SQUARELY))]
+    alike = side & (worth[:, 0] >= ALIKE * worth[side, 0].max())
     return places[kept[[int(np.argmax(np.where(alike, worth[:, 1], 0.0)))]]]

@@ -21,8 +21,8 @@ __all__ = ["SIGHT", "facing", "resettled", "sides_by_sensors"]
 # Weight of a line of sight next to the couplings of a point to its neighbours, which are 1 at most each: a few false
 # sights, through gaps, must not tear a sheet.
 SIGHT = 0.5
-# Lines seen at this sine of the angle to their planes count 0.7 of those seen face on: planes are known to about as much,
-# and seen more squarely than that, a far floor faces the sensor as surely as a near wall.
+# Lines seen at this sine of the angle to their planes count 0.7 of those seen face on: planes are known to about as
+# much, and seen more squarely than that, a far floor faces the sensor as surely as a near wall.
 GRAZING = 0.1
 # Weight of the side that a line was given before its angle was known better.
 KEPT = 0.25

@@ -131,9 +131,9 @@ def _in_the_way(
 def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sum (n, 3) of the directions in which each point is seen; of length 0 where no sensor sees it.
 
-    The direction to the nearest viewpoint that sees a point is of length 1, and those to others are shorter by the squares
-    of the distances: a sensor puts points on a surface by ``cos(angle) / distance^2``, and a thin wall that is seen from
-    both sides was scanned from where it has most points.
+    The direction to the nearest viewpoint that sees a point is of length 1, and those to others are shorter by the
+    squares of the distances: a sensor puts points on a surface by ``cos(angle) / distance^2``, and a thin wall that is
+    seen from both sides was scanned from where it has most points.
 
     `lines` (n, 3) are unit normals of either sign, roughly, such as those of planes.
     """

@@ -34,7 +34,15 @@ def ball_over_floor(gap=0.5):
     return np.concatenate([BALL.points, floor])
 
 
-@pytest.mark.parametrize("options", [{}, {"up": (0, 0, 1)}, {"execution": TILES}, {"backend": "pymeshlab"}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"execution": TILES},
+        pytest.param({"up": (0, 0, 1)}, marks=pytest.mark.slow),
+        pytest.param({"backend": "pymeshlab"}, marks=pytest.mark.slow),
+    ],
+)
 def test_a_terrain_ends_where_its_points_do(options):
     surface = reconstruct(TERRAIN.points, depth=7, **options)
     assert surface.result.open.all()
@@ -77,7 +85,7 @@ def test_closed_bodies_stay_as_they_were():
     assert np.array_equal(cut.densities, whole.densities)
 
 
-@pytest.mark.parametrize("execution", [None, TILES])
+@pytest.mark.parametrize("execution", [None, pytest.param(TILES, marks=pytest.mark.slow)])
 def test_a_body_over_a_floor_stays_whole_and_the_floor_is_cut(execution):
     points = ball_over_floor()
     opened = estimate_normals(points, execution=execution).open
@@ -140,7 +148,7 @@ def test_open_at_must_fit():
         poisson_reconstruction(BALL.points, BALL.normals, depth=5, open_at=np.ones(3, dtype=bool))
 
 
-@pytest.mark.parametrize("limit", ["auto", 1.5, None])
+@pytest.mark.parametrize("limit", ["auto", *(pytest.param(one, marks=pytest.mark.slow) for one in (1.5, None))])
 def test_chains_cut_as_reconstruct_does(limit, tmp_path):
     chain = Chain([Normals(), Interior(), Reconstruct(depth=6, trim_distance=limit)])
     for path in (tmp_path / "chain.toml", tmp_path / "chain.json"):

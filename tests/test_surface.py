@@ -208,6 +208,7 @@ def test_an_empty_surface_does_not_take_the_place_of_a_good_one(tmp_path, capfd)
     assert (tmp_path / "good.ply").read_text() == "a good one"
 
 
+@pytest.mark.slow
 def test_threads_reconstruct_as_one_does():
     """Several at once would end the process, so another is asked."""
     program = """

@@ -165,6 +165,7 @@ def test_a_script_needs_no_main_guard(tmp_path):
     assert out.stdout.split() == ["started", "1.0"]
 
 
+@pytest.mark.slow
 def test_dask_with_a_worker_killed(shape, serial):
     killed = []
     with (

@@ -82,6 +82,7 @@ def _fail(folder, tile):
     raise ValueError(f"tile {tile}")
 
 
+@pytest.mark.slow
 def test_processes_that_die_again_and_again_end_the_run():
     with Processes(2) as engine, pytest.raises(FaceError, match=r"died 3 times .*tile_points"):
         engine.run(_die, "", [0, 1, 2], print)

@@ -308,6 +308,7 @@ def test_the_points_fill_the_window(hand, session, tmp_path):
         assert columns[-1] < SIZE[0] - 1
 
 
+@pytest.mark.slow
 def test_cutting_it_open_shows_a_charge_inside(hand, session, tmp_path):
     session.mode = "carve"
     session.click([0.0, 0.0, 0.75])
@@ -323,6 +324,7 @@ def test_cutting_it_open_shows_a_charge_inside(hand, session, tmp_path):
     assert (viewer.picture.open, session.plane.axis) == (True, 0)
 
 
+@pytest.mark.slow
 def test_carving_by_the_mouse(hand, tmp_path):
     viewer, session = hand.viewer, hand.viewer.session
     before = ((session.face.normals() * session.points).sum(axis=1)).copy()
@@ -427,8 +429,10 @@ def test_a_sensor_by_the_mouse(hand, session, tmp_path):
     # The middle of the plane is seen, what lies beyond the wall is not.
     lit = session.lit_places(np.array([[0.1, 0.0, 0.6], [2.0, 0.0, 0.6]]))
     assert lit.tolist() == [True, False]
-    towards = place - session.points[seen]
-    assert ((session.face.normals()[seen] * towards).sum(axis=1) > 0).mean() > 0.95
+    # Here and there sight goes through a wall as thin as the spacing: that does not turn its outer side.
+    facing = (session.face.normals() * (place - session.points)).sum(axis=1) > 0
+    assert facing[seen & inner].mean() > 0.95
+    assert facing[wall > wall.max() - 0.02].mean() < 0.02
     assert tuple(name for name, _ in hand.viewer.picture.legend if name.startswith("se")) == ("seen", "sensor")
     assert not np.array_equal(hand.picture(tmp_path / "after.png"), before)
     hand.press("save viewpoints")

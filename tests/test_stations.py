@@ -49,8 +49,8 @@ def test_the_station_of_a_single_view_is_found(rays):
     points, _, station = scan(rays)
     # Of 40 m: its place over the ground is told well, and its height little. Measured: 0.2 to 3 m.
     stations = found(points)
-    # Two beside one another may explain the chance in it a little better than one.
-    assert len(stations) <= 2
+    # Of a camera's rows, thinned at random, two beside one another explain the chance a little better than one.
+    assert len(stations) <= (2 if rays == "camera" else 1)
     assert np.linalg.norm(stations - station, axis=1).max() < 5.0
 
 

@@ -33,11 +33,14 @@ demo: $(STAMP)
 	$(BIN)/face plot --interior out/demo_points.ply -o out/demo_interior.png --title "What the interior filter does"
 	$(BIN)/python examples/which_side.py --out out --only room street
 
+# One process a core; a file stays in one, so that what its tests share is made once.
+PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadfile
+
 test: $(STAMP)
-	@$(BIN)/python -m pytest
+	@$(PYTEST)
 
 test-all: $(STAMP)
-	@$(BIN)/python -m pytest -m "slow or not slow"
+	@$(PYTEST) -m "slow or not slow"
 
 lint: $(STAMP)
 	@$(BIN)/ruff check .

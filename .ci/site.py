@@ -1,5 +1,6 @@
-"""What the site needs besides `mkdocs.yml`: the pages about benchmarks lie beside the docs, not in them."""
+"""What the site needs besides `mkdocs.yml`: benchmarks lie beside the docs, and the gallery shows the examples."""
 
+import ast
 from pathlib import Path
 
 from mkdocs.structure.files import File
@@ -15,5 +16,17 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Links between the two folders are shorter within the site."""
-    return markdown.replace("](../benchmarks/", "](benchmarks/").replace("](../docs/", "](../")
+    """Shorten links between the two folders, and show the examples where their pictures stand."""
+    markdown = markdown.replace("](../benchmarks/", "](benchmarks/").replace("](../docs/", "](../")
+    if page.file.src_uri == "gallery.md":
+        for example in sorted((ROOT / "examples").glob("*.py")):
+            markdown = markdown.replace(f"<!-- source: {example.name} -->", _source(example))
+    return markdown
+
+
+def _source(example):
+    """Fold up an example's code below what it says of itself."""
+    text = example.read_text(encoding="utf-8")
+    shown = "".join(f"    {line}\n" if line else "\n" for line in text.splitlines())
+    what = ast.get_docstring(ast.parse(text)).splitlines()[0]
+    return f'{what}\n\n??? example "examples/{example.name}"\n\n    ```python\n{shown}    ```\n'

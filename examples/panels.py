@@ -39,7 +39,7 @@ def save_panels(path: Path, panels: list[tuple[str, Any]]) -> None:
         axes.set_title(title, fontsize=10)
         axes.axis("off")
     figure.tight_layout()
-    save_figure(figure, path)
+    save_small(figure, path)
 
 
 def save_small(figure: Figure, path: Path) -> None:

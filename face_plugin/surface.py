@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import logging
-import threading
 from collections.abc import Callable
 from typing import Literal
 
@@ -12,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.cloud import as_points
-from face_plugin.errors import FaceError, MissingDependencyError, require
+from face_plugin.errors import FaceError, MissingDependencyError
 from face_plugin.memory import GIGABYTE, available_memory
+from face_plugin.poisson_hosts import by_open3d, by_pymeshlab
 from face_plugin.threads import KDTree
 from face_plugin.trimming import Arrays, TrimDistance, check_distance, trimmed, where_to_cut
 
@@ -52,9 +52,6 @@ PROBES = 2_000
 CELL_BYTES = 1.5e3
 DEEPER_SHARE = 0.6
 _BITS = 20
-
-# The hosts share state within a process: several reconstructions at once crash, PyMeshLab's more often than Open3D's.
-_one_at_a_time = threading.Lock()
 
 
 def poisson_reconstruction(
@@ -129,7 +126,7 @@ def poisson_reconstruction(
     if depth is None:
         depth = suggested_depth(local)
     warn_if_too_large(local, depth)
-    run = _open3d if backend == "open3d" else _pymeshlab
+    run = by_open3d if backend == "open3d" else by_pymeshlab
     cut_at = where_to_cut(len(local), trim_distance, open_at)
     # What is cut all around need not be closed before.
     scales = SCALES[:1] if cut_at.all() else SCALES
@@ -193,16 +190,11 @@ def _closed(
 
     That of a sheet is closed in none, and is then that of the first.
     """
-
-    def made_in(scale: float) -> Arrays:
-        with _one_at_a_time:
-            return run(points, normals, depth, weight, scale)
-
-    made = [made_in(scales[0])]
+    made = [run(points, normals, depth, weight, scales[0])]
     for scale in scales[1:]:
         if is_closed(made[-1][1]):
             return made[-1]
-        made.append(made_in(scale))
+        made.append(run(points, normals, depth, weight, scale))
     return made[-1] if len(made) > 1 and is_closed(made[-1][1]) else made[0]
 
 
@@ -212,37 +204,6 @@ def is_closed(faces: NDArray[np.integer]) -> bool:
     size = int(edges.max(initial=0)) + 1
     there, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
     return len(faces) > 0 and np.array_equal(np.sort(there), np.sort(back))
-
-
-def _open3d(
-    points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
-) -> Arrays:
-    o3d = require("open3d", extra="open3d")
-    pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    pcd.normals = o3d.utility.Vector3dVector(normals)
-    # One thread: with more, the order of summation, and so the surface, changes from run to run.
-    mesh, densities = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
-        pcd, depth=depth, point_weight=weight, scale=scale, n_threads=1
-    )
-    return (
-        np.asarray(mesh.vertices).copy(),
-        np.asarray(mesh.triangles).astype(np.int64),
-        np.asarray(densities).copy(),
-    )
-
-
-def _pymeshlab(
-    points: NDArray[np.float64], normals: NDArray[np.float64], depth: int, weight: float, scale: float
-) -> Arrays:
-    pymeshlab = require("pymeshlab", extra="pymeshlab")
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
-    # One thread, as with Open3D.
-    meshes.generate_surface_reconstruction_screened_poisson(
-        depth=depth, pointweight=weight, scale=scale, preclean=False, threads=1
-    )
-    mesh = meshes.current_mesh()
-    return mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64), None
 
 
 def suggested_depth(points: NDArray[np.floating]) -> int:

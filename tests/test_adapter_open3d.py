@@ -159,7 +159,7 @@ def test_colours_of_the_points_kept_come_to_the_surface():
 
 
 def test_a_tensor_cloud_gives_a_tensor_mesh():
-    options = {"depth": 5, "filter_interior": False, "screened": False}
+    options = {"depth": 5, "filter_interior": False}
     mesh, densities = face.create_from_point_cloud_face(tensor(), **options)
     assert isinstance(mesh, o3d.t.geometry.TriangleMesh)
     assert isinstance(densities, o3d.core.Tensor)

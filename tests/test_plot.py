@@ -144,7 +144,7 @@ def test_figure_of_a_result(tmp_path: Path) -> None:
     save_figure(figure, tmp_path / "a.png")
     assert looks_drawn(tmp_path / "a.png")
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
-    assert figure.get_suptitle() == "ball"
+    assert [text.get_text() for text in figure.texts] == ["ball"]
     assert "y = 0" in figure.axes[2].get_title() or "x = 0" in figure.axes[2].get_title()
 
 

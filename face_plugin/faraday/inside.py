@@ -24,6 +24,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from face_plugin.faraday.solid_angles import winding_number
+
 __all__ = ["inside", "inside_by_rays", "inside_by_winding"]
 
 log = logging.getLogger(__name__)
@@ -109,8 +111,8 @@ def inside_by_rays(
     Notes
     -----
     Takes the place of the winding number in section 3.4 of the paper; exact but for single precision, in
-    which Embree works, and faster. Coordinates are centred and scaled first. Where there is no Embree (its
-    package has no wheel for Linux on ARM) the winding number answers, which is said once in the log.
+    which Embree works, and faster. Coordinates are centred and scaled first. Without Embree, an extra, as it
+    has no wheel for Linux on ARM, the winding number answers, which is said once in the log.
 
     Examples
     --------
@@ -163,8 +165,7 @@ def inside_by_winding(points: ArrayLike, v: ArrayLike, f: ArrayLike, *, threshol
 
     Notes
     -----
-    Paper section 3.4, through libigl's fast winding number (Barill et al. 2018), which is approximate and
-    works in single precision. Coordinates are centred and scaled first.
+    Paper section 3.4, by the fast winding number (Barill et al. 2018). Coordinates are centred and scaled first.
 
     Examples
     --------
@@ -178,12 +179,7 @@ def inside_by_winding(points: ArrayLike, v: ArrayLike, f: ArrayLike, *, threshol
     faces = faces[_normals(corners, faces).any(axis=1)]
     if not len(faces) or not len(queries):
         return np.zeros(len(queries), dtype=bool)
-    import igl
-
-    # libigl 2.6 dropped the suffix that 2.5 has.
-    function = getattr(igl, "fast_winding_number", None) or igl.fast_winding_number_for_meshes
-    number: NDArray[np.float64] = np.ravel(function(corners, faces, queries))
-    return number > threshold
+    return winding_number(queries, corners, faces) > threshold
 
 
 @cache
@@ -191,7 +187,11 @@ def _embree_loads() -> bool:
     try:
         import embreex.rtcore_scene  # noqa: F401
     except (ImportError, OSError) as error:
-        log.info("embreex cannot be loaded (%s): the winding number tells what is inside", error)
+        log.info(
+            "embreex cannot be loaded (%s): the winding number tells what is inside; rays are faster: "
+            "pip install 'face-plugin[embree]'",
+            error,
+        )
         return False
     return True
 

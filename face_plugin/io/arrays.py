@@ -221,7 +221,7 @@ def write(path: Path, cloud: CloudFile, normals: Array | None, extra: Mapping[st
         if normals is not None:
             out["normals"] = normals
         kept = {name: values if keep is None else values[keep] for name, values in out.items()}
-        np.savez(path, allow_pickle=False, **{**arrays, **kept})
+        np.savez(path, **{**arrays, **kept})
         return
     points, normals, attributes = columns(cloud, normals, extra, keep)
     # Four columns would be points in space, and something more: what has names cannot be mistaken.

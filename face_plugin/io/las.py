@@ -127,5 +127,5 @@ def new_las(laspy: ModuleType, points: Array) -> Any:
     # 2e9 steps fit 32 bits; a power of ten keeps decimal coordinates readable.
     header.scales = 10.0 ** np.ceil(np.log10(np.maximum(extent, 1e-300) / 2e9))
     las = laspy.LasData(header)
-    las.x, las.y, las.z = points.T
+    las.x, las.y, las.z = points.T.astype(np.float64)
     return las

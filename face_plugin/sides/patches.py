@@ -28,7 +28,17 @@ from face_plugin.planes import plane_fits
 from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
 
-__all__ = ["HOLD_FIELD", "SMALLEST", "Planes", "closure", "lines_at", "planes_of", "turned_patches", "winding_number"]
+__all__ = [
+    "HOLD_FIELD",
+    "SMALLEST",
+    "Planes",
+    "border",
+    "closure",
+    "lines_at",
+    "planes_of",
+    "turned_patches",
+    "winding_number",
+]
 
 # Neighbours of the plane that a sheet is taken for, as hosts take by default.
 PLANE_NEIGHBOURS = 30
@@ -185,7 +195,7 @@ def turned_patches(
         return turned
     inside = patch >= 0
     then = closure(around, np.where(inside[:, None], -normals, normals))
-    border = _border(patch, count, sign, edges, coupling)
+    says = border(patch, count, sign, edges, coupling)
     members = np.bincount(patch[inside], minlength=count)
     before, after, loss = (
         np.bincount(patch[inside], values[inside], minlength=count) / members for values in (closed, then, field)
@@ -194,7 +204,7 @@ def turned_patches(
     counts = 1.0 if lit is None else np.bincount(patch[inside], lit[inside], minlength=count) / members
     gain = np.where(after > before, after * counts, 1.0) * (after - before)
     # The square: a border half of whose edges agree says nothing.
-    right = (border > 0) & (BORDER * border**2 + CLOSURE * gain > loss + MARGIN)
+    right = (says > 0) & (BORDER * says**2 + CLOSURE * gain > loss + MARGIN)
     if sealed is not None and right.any():
         asked = inside & right[patch]
         right &= np.bincount(patch[asked], sealed(asked)[asked], minlength=count) <= SEALED * members
@@ -202,10 +212,32 @@ def turned_patches(
     return turned
 
 
-def _border(
+def border(
     patch: NDArray[np.intp], count: int, sign: NDArray[np.float64], edges: Edges, coupling: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Tell what the edges across the border of each patch (count,) say: -1 to 1, positive where it is to be turned."""
+    """Tell what the edges across the border of each patch say: -1 to 1, positive where it is to be turned.
+
+    Parameters
+    ----------
+    patch : (n,) intp
+        Of each point, as `connected_parts` has it.
+    count : int
+        Number m of patches.
+    sign : (n,) float64
+        1 or -1; edges between points that differ in it are the borders.
+    edges : Edges
+    coupling : (e,) float64
+
+    Returns
+    -------
+    (m,) float64
+
+    Examples
+    --------
+    >>> row = Edges(np.arange(3), np.arange(1, 4))
+    >>> border(np.array([-1, -1, 0, 0]), 1, np.array([1.0, 1, -1, -1]), row, np.array([0.9, -0.5, 0.9]))
+    array([1.])
+    """
     across = sign[edges.first] != sign[edges.second]
     says = np.zeros(count)
     weight, number = np.zeros(count), np.zeros(count)

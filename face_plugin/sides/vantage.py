@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from face_plugin.geometry import evenly, lattice
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.clusters import better_signs, cluster_signs
-from face_plugin.sides.facing import SIGHT, facing
+from face_plugin.sides.clusters import cluster_signs
+from face_plugin.sides.facing import facing
 from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.sensors import Sensors
+from face_plugin.sides.settling import settled_signs
 from face_plugin.sides.sights import sights
 
 __all__ = ["is_open", "sides_from_vantage"]
@@ -89,7 +90,8 @@ def sides_from_vantage(
     1.0
     """
     lines, edges, coupling = (planes or planes_of(around)).along(normals)
-    signed = abs(float(cluster_signs(len(around), edges, coupling).mean())) > AGREED
+    joined = cluster_signs(len(around), edges, coupling)
+    signed = abs(float(joined.mean())) > AGREED
     best, score = np.ones(len(around)), WORTH * NEAR
     for place in _places(around.points, lines, signed):
         evidence = facing(lines, sights(around, place, lines))
@@ -101,7 +103,7 @@ def sides_from_vantage(
             continue
         # The sides that are known may all be those of the back: what is turned then is turned from that.
         whole = 1.0 if evidence.sum() >= 0 else -1.0
-        sign = better_signs(len(around), edges, coupling, whole * SIGHT * evidence)
+        sign = settled_signs(edges, coupling, whole * evidence, joined)
         reached = one_sided if doubted else weight * whole * float((evidence * sign).mean())
         if reached > score:
             trusted = not doubted or one_sided > ONE_SIDE * seen

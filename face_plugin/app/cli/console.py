@@ -9,29 +9,25 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from face_plugin.app.cli.bars import Bars
+from face_plugin.app.cli.progress import Progress
 
 __all__ = ["Console"]
 
 
 class Console:
-    """Progress bars, log messages and the closing summary of one run."""
+    """Progress, log messages and the closing summary of one run."""
 
     def __init__(self, command: str, verbose: bool, quiet: bool, as_json: bool, write: Callable[[str], None]) -> None:
         self.command, self.verbose, self.quiet, self.as_json = command, verbose, quiet, as_json
         self._write = write
         self._start = time.perf_counter()
-        self._bars: Bars | None = None
+        self._progress = Progress(sys.stderr)
         self.heard: list[int] = []
 
     def __enter__(self) -> Console:
         """Start to show log messages and warnings."""
-        from rich.console import Console as RichConsole
-
-        self._stderr = RichConsole(stderr=True, highlight=False, soft_wrap=True)
         self._handler = _Handler(self.note)
         self._loggers = [logging.getLogger("face_plugin"), logging.getLogger("py.warnings")]
         level = logging.ERROR if self.quiet else logging.DEBUG if self.verbose else logging.WARNING
@@ -48,8 +44,8 @@ class Console:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the bars and give logging back."""
-        self._close_bars()
+        """Leave the progress as it stands and give logging back."""
+        self._progress.close()
         logging.captureWarnings(False)
         for logger, level in zip(self._loggers, self._levels, strict=True):
             logger.removeHandler(self._handler)
@@ -63,11 +59,7 @@ class Console:
             raise KeyboardInterrupt
         if self.quiet:
             return
-        if self._bars is None:
-            from face_plugin.app.cli.bars import Bars
-
-            self._bars = Bars(self._stderr)
-        self._bars.update(stage, fraction)
+        self._progress.update(stage, fraction)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -77,12 +69,12 @@ class Console:
         self.progress(name, 1.0)
 
     def note(self, message: str) -> None:
-        """Write a line to stderr, above the bars."""
-        self._stderr.print(message.rstrip("\n"), markup=False)
+        """Write a line to stderr, above the stage at work."""
+        self._progress.note(message.rstrip("\n"))
 
     def report(self, summary: Mapping[str, Any], text: str) -> None:
         """Say what was done: JSON where it was asked for, else one or more lines of text."""
-        self._close_bars()
+        self._progress.close()
         seconds = time.perf_counter() - self._start
         if self.as_json:
             full = {"command": self.command, **summary, "seconds": round(seconds, 3), **_peak_memory()}
@@ -92,16 +84,11 @@ class Console:
 
     def fail(self, message: str, code: int) -> int:
         """Say what went wrong and return the exit code."""
-        self._close_bars()
+        self._progress.close()
         self.note(f"face: error: {message}")
         if self.as_json:
             self._write(json.dumps({"command": self.command, "error": message, "exit_code": code}) + "\n")
         return code
-
-    def _close_bars(self) -> None:
-        if self._bars is not None:
-            self._bars.close()
-            self._bars = None
 
 
 class _Handler(logging.Handler):

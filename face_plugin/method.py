@@ -28,7 +28,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.blind import sides_as_seen, sides_by_field
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
-from face_plugin.sides.facing import resettled, sides_by_sensors
+from face_plugin.sides.facing import as_faced, resettled, sides_by_sensors
 from face_plugin.sides.patches import planes_of
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.vantage import is_open
@@ -179,6 +179,9 @@ def refine(
     side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, still, plate)
     if sights is not None:
         side = sides_by_sensors(around, sights, unit(blind), planes)
+        if not is_open(field.difference):
+            # Of closed bodies the field knows the normals better than planes do.
+            side = as_faced(around, unit(blind), side)
     elif is_open(field.difference) and not still.any():
         # What is thinner than the spacing has both of its sides in one place: only the field tells them apart.
         side = np.where(plate[:, None], side, sides_as_seen(around, field, side, planes))

@@ -16,7 +16,7 @@ from face_plugin.sides.cuts import cut_signs
 from face_plugin.sides.graph import couplings, neighbours_around
 from face_plugin.sides.patches import Planes, planes_of
 
-__all__ = ["SIGHT", "facing", "resettled", "sides_by_sensors"]
+__all__ = ["SIGHT", "as_faced", "facing", "resettled", "sides_by_sensors"]
 
 # Weight of a line of sight next to the couplings of a point to its neighbours, which are 1 at most each: a few false
 # sights, through gaps, must not tear a sheet.
@@ -68,6 +68,37 @@ def sides_by_sensors(
     evidence = _evidence(lines, seen, blind)
     sign = cut_signs(cluster_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
     return np.asarray(lines * sign[:, None])
+
+
+def as_faced(around: Neighbourhood, normals: NDArray[np.float64], faced: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn normals (n, 3) to the sides of others (n, 3), whole patches at a time.
+
+    Sides by sensors come with the lines of planes, which mean nothing on rods and rims thinner than their neighbours
+    reach. Of a closed body the normals found without sensors have better lines, and are only to be turned.
+
+    Parameters
+    ----------
+    around : Neighbourhood
+        Of the points.
+    normals : (n, 3) float64
+        Unit normals, on one side within patches.
+    faced : (n, 3) float64
+        Unit normals on the right side.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(1000)
+    >>> faced = np.where(np.arange(1000)[:, None] % 9 == 0, np.roll(ball.normals, 1, axis=1), -ball.normals)
+    >>> turned = as_faced(Neighbourhood(ball.points), ball.normals, faced)
+    >>> bool(((turned * ball.normals).sum(axis=1) < 0).all())
+    True
+    """
+    edges = neighbours_around(around, normals)
+    coupling = couplings(around.points, normals, edges)
+    evidence = SIGHT * np.einsum("nd,nd->n", faced, normals)
+    sign = cut_signs(better_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
+    return np.asarray(normals * sign[:, None])
 
 
 def _evidence(

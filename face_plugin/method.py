@@ -30,6 +30,7 @@ from face_plugin.sides.blind import sides_as_seen, sides_by_field
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
 from face_plugin.sides.facing import as_faced, resettled, sides_by_sensors
 from face_plugin.sides.patches import planes_of
+from face_plugin.sides.reach import Reach
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
@@ -100,6 +101,7 @@ def orient(
     sheets: Sheets | None = None,
     moving: NDArray[np.bool_] | None = None,
     sights: NDArray[np.float64] | None = None,
+    reach: Reach | None = None,
 ) -> NDArray[np.float64]:
     """From the field at the points, and what sensors saw, to their normals.
 
@@ -111,7 +113,7 @@ def orient(
     params : Params
     plane : (3,) float64, optional
         Unit normal of the plane that all points lie in.
-    sheets, moving, sights
+    sheets, moving, sights, reach
         As of `refine`.
 
     Returns
@@ -128,7 +130,7 @@ def orient(
     if params.angles == "field" and sights is None:
         # The strength grows outward, so its gradient at a ball points outward (3.4).
         return field.normals
-    return refine(around, field, sheets, moving, sights)
+    return refine(around, field, sheets, moving, sights, reach)
 
 
 def refine(
@@ -137,6 +139,7 @@ def refine(
     sheets: Sheets | None = None,
     moving: NDArray[np.bool_] | None = None,
     sights: NDArray[np.float64] | None = None,
+    reach: Reach | None = None,
 ) -> NDArray[np.float64]:
     """Refine rough outward normals by the points themselves: first their side, then their angle.
 
@@ -153,6 +156,8 @@ def refine(
     sights : (n, 3) float64, optional
         Directions in which sensors saw the points, as `face_plugin.sides.sights.sights` has them: they decide on the
         sides then, and the field does not.
+    reach : Reach, optional
+        Of the points, where it is asked again later.
 
     Returns
     -------
@@ -176,7 +181,8 @@ def refine(
 
     # 1. Side.
     planes = planes_of(around)
-    side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, still, plate)
+    reach = reach or Reach(around)
+    side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, reach, still, plate)
     if sights is not None:
         side = sides_by_sensors(around, sights, unit(blind), planes)
         if not is_open(field.difference):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +20,7 @@ from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import borne_out, open_parts, parts, told_by
 from face_plugin.sides.patches import lines_at
+from face_plugin.sides.reach import Reach
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.sights import sights
@@ -27,6 +29,8 @@ from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
 
 __all__ = ["Reading"]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +67,23 @@ class Reading:
         return field_at_points(self.cage.mesh, self.strength, self.cage.balls, self.around.points)
 
     @cached_property
+    def reach(self) -> Reach:
+        """Where free space gets to between the distinct points."""
+        return Reach(self.around)
+
+    @cached_property
     def as_solids(self) -> NDArray[np.float64]:
         """Normals of the distinct points (m, d), before bodies within others are read as cavities."""
         with self.stage("normals"):
-            return orient(self.around, self.seen, self.params, plane=self.plane, sheets=self.sheets, sights=self.sights)
+            return orient(
+                self.around,
+                self.seen,
+                self.params,
+                plane=self.plane,
+                sheets=self.sheets,
+                sights=self.sights,
+                reach=self.reach,
+            )
 
     @cached_property
     def nesting(self) -> Nesting | None:
@@ -91,8 +108,18 @@ class Reading:
     def enclosed(self) -> NDArray[np.bool_]:
         """Which distinct points (m,) the others enclose."""
         found = enclosure.enclosed(self.around, self.normals, self.seen.strength)
-        # What a sensor saw does not lie inside anything.
-        return found if self.looked_at is None else found & ~self.looked_at
+        if self.looked_at is not None:
+            # What a sensor saw does not lie inside anything.
+            return found & ~self.looked_at
+        if not self.around.plane and found.any() and self.reach.gets_among(found, self.normals):
+            log.warning(
+                "%d of %d points seem to lie inside, but free space gets to them: they are kept; "
+                "if this was scanned from inside, give its viewpoints",
+                found.sum(),
+                len(found),
+            )
+            return np.zeros_like(found)
+        return found
 
     @cached_property
     def agreement(self) -> NDArray[np.float64]:

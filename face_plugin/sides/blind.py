@@ -30,6 +30,7 @@ def sides_by_field(
     field: FieldAtPoints,
     sheets: Sheets,
     planes: Planes,
+    reach: Reach,
     still: NDArray[np.bool_],
     plate: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
@@ -45,6 +46,8 @@ def sides_by_field(
         Of the points.
     planes : Planes
         Those of `around`.
+    reach : Reach
+        Of the points.
     still : (n,) bool
         Normals that are known; they take part as they are.
     plate : (n,) bool
@@ -59,12 +62,11 @@ def sides_by_field(
     >>> around, none = Neighbourhood(ball.points), np.zeros(1000, dtype=bool)
     >>> votes = np.where(np.arange(1000)[:, None] % 5, ball.normals, -ball.normals)
     >>> field = FieldAtPoints(np.ones(1000), votes, np.ones(1000))
-    >>> side = sides_by_field(around, field, find_sheets(around), planes_of(around), none, none)
+    >>> side = sides_by_field(around, field, find_sheets(around), planes_of(around), Reach(around), none, none)
     >>> bool(((side * ball.normals).sum(axis=1) > 0).all())
     True
     """
     votes, kept = field.votes, plate | still
-    reach = Reach(around)
     # Stray votes turn round to those around them.
     side = turn_sides(around, votes, field.strength, sheets, kept)
     # Patches that are wrong as a whole are turned as a whole; the steps then tidy up behind them.

@@ -33,6 +33,10 @@ WIDENED = (1.0, 1.15, 1.3, 1.5)
 # Space is wide if a ball so much larger fits in: in a bore that the ball does not get into, gaps of its wall make room
 # for one as large here and there.
 ROOMY = 1.15
+# Free space gets to a point that has it on one side by this share more than on the other, and among points that others
+# seem to enclose if to so many of them: 0.85 where scans of rooms are merged and thinned to a grid, as what stands in
+# them left shadows; 0 in bodies with others inside, and up to 0.47 in sketches of sparse strokes.
+ONE_SIDED, MOST = 0.5, 0.7
 # Points are moved by at most so many spacings before they are meshed: rows are the worst case of meshers.
 OUT_OF_ROWS = 1e-3
 # A point is inside out where the winding number of the others is farther than this from the surface's 1/2.
@@ -150,6 +154,23 @@ class Reach:
         ball, reached, _ = self._best(in_front)
         sealed = self._shapes.roomy(ROOMY * ball) & ~reached
         return self._share(~in_front, sealed, 0.0) > 0.5
+
+    def gets_among(self, enclosed: NDArray[np.bool_], normals: NDArray[np.float64]) -> bool:
+        """Tell whether free space gets to most of the points (n,) that others seem to enclose: then nothing does.
+
+        The least ball tells: larger ones are for gaps of the sampling, which lie in the surface and not behind it.
+
+        Examples
+        --------
+        >>> from face_plugin.shapes import nested_box
+        >>> box = nested_box(2000)
+        >>> around = Neighbourhood(box.points)
+        >>> Reach(around).gets_among(box.interior, box.normals), Reach(around).gets_among(~box.interior, box.normals)
+        (False, True)
+        """
+        in_front, free = self._in_front(normals), self._reached[0][1]
+        says = self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0)
+        return bool(enclosed.any() and (np.abs(says[enclosed]) > ONE_SIDED).mean() > MOST)
 
     @classmethod
     def places(

@@ -171,7 +171,9 @@ def test_every_setting_is_an_option(name: str, capfd: pytest.CaptureFixture[str]
     args = parser.parse_args([*words, flag, str(value)])
     assert params_of(args) == Params(**{name: value})
     assert main(["normals", "--help"]) == 0
-    assert flag in capfd.readouterr().out
+    text = capfd.readouterr().out
+    assert flag in text
+    assert "None" not in text
 
 
 def test_alpha_by_name_and_the_settings_of_the_paper() -> None:

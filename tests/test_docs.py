@@ -42,6 +42,15 @@ def test_links_lead_somewhere(page):
     assert missing == []
 
 
+def test_every_example_is_in_the_gallery():
+    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    shown = re.findall(r"<!-- source: (\w+\.py) -->", gallery)
+    # The others only draw for these.
+    assert sorted([*shown, "panels.py", "sculpt_panels.py"]) == sorted(
+        path.name for path in (ROOT / "examples").glob("*.py")
+    )
+
+
 @pytest.mark.parametrize("module", re.findall(r"^## .*`(\S+)`", API, re.MULTILINE))
 def test_every_public_name_is_listed_and_no_other(module):
     section = API.split(f"`{module}`\n")[1].split("\n## ")[0]

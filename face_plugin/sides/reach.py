@@ -34,9 +34,9 @@ WIDENED = (1.0, 1.15, 1.3, 1.5)
 # for one as large here and there.
 ROOMY = 1.15
 # Free space gets to a point that has it on one side by this share more than on the other, and among points that others
-# seem to enclose if to so many of them: 0.85 where scans of rooms are merged and thinned to a grid, as what stands in
-# them left shadows; 0 in bodies with others inside, and up to 0.47 in sketches of sparse strokes.
-ONE_SIDED, MOST = 0.5, 0.7
+# seem to enclose if to so many of them: 0.75 to 0.85 where scans of rooms are merged and thinned to a grid, as what
+# stands in them left shadows; 0 in bodies with others inside, and up to 0.48 in sketches of sparse strokes.
+ONE_SIDED, MOST = 0.5, 0.6
 # Points are moved by at most so many spacings before they are meshed: rows are the worst case of meshers.
 OUT_OF_ROWS = 1e-3
 # A point is inside out where the winding number of the others is farther than this from the surface's 1/2.
@@ -158,7 +158,8 @@ class Reach:
     def gets_among(self, enclosed: NDArray[np.bool_], normals: NDArray[np.float64]) -> bool:
         """Tell whether free space gets to most of the points (n,) that others seem to enclose: then nothing does.
 
-        The least ball tells: larger ones are for gaps of the sampling, which lie in the surface and not behind it.
+        The least ball gets to most, and what it does not get to is enclosed. Where it does, a single gap of the sampling
+        may have let it in, and the ball that tells most decides.
 
         Examples
         --------
@@ -169,8 +170,12 @@ class Reach:
         (False, True)
         """
         in_front, free = self._in_front(normals), self._reached[0][1]
-        says = self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0)
-        return bool(enclosed.any() and (np.abs(says[enclosed]) > ONE_SIDED).mean() > MOST)
+        least = self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0)
+
+        def among(says: NDArray[np.float64]) -> bool:
+            return bool(enclosed.any() and (np.abs(says[enclosed]) > ONE_SIDED).mean() > MOST)
+
+        return among(least) and among(self._best(in_front)[2])
 
     @classmethod
     def places(

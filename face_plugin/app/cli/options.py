@@ -86,8 +86,10 @@ def add_method(parser: argparse.ArgumentParser) -> None:
 def _add_fields(group: Any, settings: type[Params | Execution]) -> None:
     hints, texts = get_type_hints(settings), _descriptions(settings)
     for field in dataclasses.fields(settings):
+        # Nobody can write None in a shell: it is what is not given.
+        said = texts.get(field.name, "").replace("None = ", "if not given, ")
         default = "from the data" if field.default is None else field.default
-        text = f"{texts.get(field.name, '')} [default: {default}]".strip().replace("%", "%%")
+        text = f"{said} [default: {default}]".strip().replace("%", "%%")
         flag = "--" + field.name.replace("_", "-")
         group.add_argument(flag, dest=f"setting_{field.name}", help=text, **_kind(hints[field.name]))
 

@@ -158,8 +158,8 @@ class Reach:
     def gets_among(self, enclosed: NDArray[np.bool_], normals: NDArray[np.float64]) -> bool:
         """Tell whether free space gets to most of the points (n,) that others seem to enclose: then nothing does.
 
-        The least ball gets to most, and what it does not get to is enclosed. Where it does, a single gap of the sampling
-        may have let it in, and the ball that tells most decides.
+        The least ball gets to most, and what it does not get to is enclosed. Where it does get, a single gap of the
+        sampling may have let it in, and the ball that tells most decides.
 
         Examples
         --------

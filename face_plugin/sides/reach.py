@@ -116,9 +116,13 @@ class Reach:
         # Beyond the hull there are none.
         return np.where(count > 0, found / np.maximum(count, 1), beyond)
 
+    def _says(self, in_front: NDArray[np.bool_], free: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Share (n,) of the tetrahedra in front of each point that are free (t,), less that of those behind it."""
+        return self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0)
+
     def _best(self, in_front: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
         """Ball that tells most, what it reaches, and what that says (n,) of normals."""
-        says = [self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0) for _, free in self._reached]
+        says = [self._says(in_front, free) for _, free in self._reached]
         best = int(np.argmax([np.abs(of).mean() for of in says]))
         return *self._reached[best], says[best]
 
@@ -169,13 +173,12 @@ class Reach:
         >>> Reach(around).gets_among(box.interior, box.normals), Reach(around).gets_among(~box.interior, box.normals)
         (False, True)
         """
-        in_front, free = self._in_front(normals), self._reached[0][1]
-        least = self._share(in_front, free, 1.0) - self._share(~in_front, free, 1.0)
+        in_front = self._in_front(normals)
 
         def among(says: NDArray[np.float64]) -> bool:
             return bool(enclosed.any() and (np.abs(says[enclosed]) > ONE_SIDED).mean() > MOST)
 
-        return among(least) and among(self._best(in_front)[2])
+        return among(self._says(in_front, self._reached[0][1])) and among(self._best(in_front)[2])
 
     @classmethod
     def places(

@@ -94,11 +94,7 @@ def as_faced(around: Neighbourhood, normals: NDArray[np.float64], faced: NDArray
     >>> bool(((turned * ball.normals).sum(axis=1) < 0).all())
     True
     """
-    edges = neighbours_around(around, normals)
-    coupling = couplings(around.points, normals, edges)
-    evidence = SIGHT * np.einsum("nd,nd->n", faced, normals)
-    sign = cut_signs(better_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
-    return np.asarray(normals * sign[:, None])
+    return _turned(around, normals, SIGHT * np.einsum("nd,nd->n", faced, normals))
 
 
 def _evidence(
@@ -125,8 +121,12 @@ def resettled(
     blind: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Settle the sides of normals (n, 3) of better angles again, by what was seen (n, 3) and along sheets."""
+    return _turned(around, normals, _evidence(normals, seen, blind) + KEPT)
+
+
+def _turned(around: Neighbourhood, normals: NDArray[np.float64], evidence: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn normals (n, 3) where evidence (n,) and what couples them to their neighbours say so together."""
     edges = neighbours_around(around, normals)
     coupling = couplings(around.points, normals, edges)
-    evidence = _evidence(normals, seen, blind) + KEPT
     sign = cut_signs(better_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
     return np.asarray(normals * sign[:, None])

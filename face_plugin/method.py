@@ -180,15 +180,17 @@ def refine(
     plate = back_to_back(around, field.votes)
 
     # 1. Side.
+    closed = not is_open(field.difference)
+    as_seen = sights is None and not closed and not still.any()
     planes = planes_of(around)
     reach = reach or Reach(around)
     side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, reach, still, plate)
     if sights is not None:
         side = sides_by_sensors(around, sights, unit(blind), planes)
-        if not is_open(field.difference):
+        if closed:
             # Of closed bodies the field knows the normals better than planes do.
             side = as_faced(around, unit(blind), side)
-    elif is_open(field.difference) and not still.any():
+    elif as_seen:
         # What is thinner than the spacing has both of its sides in one place: only the field tells them apart.
         side = np.where(plate[:, None], side, sides_as_seen(around, field, side, planes))
     del planes
@@ -200,7 +202,7 @@ def refine(
 
     # 3. Borders: where the sheet of a body ends in the open, the field has a say in the angle as well. What encloses
     # nothing goes on as it is.
-    if sights is None and not is_open(field.difference):
+    if sights is None and closed:
         refined = bend_borders(points, refined, field.votes, field.strength, neighbour)
 
     # 4. Level: the surface that the normals describe together is made to pass through the points.
@@ -209,6 +211,8 @@ def refine(
     if sights is not None:
         # The angle is known better now, and so is which side of it was seen.
         refined = resettled(around, refined, sights, unit(blind))
+    elif as_seen:
+        refined = np.where(plate[:, None], refined, resettled(around, refined))
     return np.where(still[:, None], field.votes, refined)
 
 

@@ -117,11 +117,21 @@ def _evidence(
 def resettled(
     around: Neighbourhood,
     normals: NDArray[np.float64],
-    seen: NDArray[np.float64],
+    seen: NDArray[np.float64] | None = None,
     blind: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Settle the sides of normals (n, 3) of better angles again, by what was seen (n, 3) and along sheets."""
-    return _turned(around, normals, _evidence(normals, seen, blind) + KEPT)
+    """Settle the sides of normals (n, 3) of better angles again, along sheets and by what was seen (n, 3), if anything.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> ball = sphere(1000)
+    >>> astray = np.where(np.arange(1000)[:, None] % 50 == 0, -ball.normals, ball.normals)
+    >>> bool((resettled(Neighbourhood(ball.points), astray) == ball.normals).all())
+    True
+    """
+    evidence = np.full(len(around), KEPT)
+    return _turned(around, normals, evidence if seen is None else evidence + _evidence(normals, seen, blind))
 
 
 def _turned(around: Neighbourhood, normals: NDArray[np.float64], evidence: NDArray[np.float64]) -> NDArray[np.float64]:

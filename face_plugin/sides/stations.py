@@ -21,14 +21,15 @@ __all__ = ["LOOKED_WITH", "believed_stations", "find_stations"]
 
 # Stations are believed where the logarithms of area are nearer to what they say than to one another by this, by
 # medians: 0.02 to 0.7 on one to four views, generated and real; 0.7 to 1.0 on eight and more, on what a camera saw from
-# all round, and on clouds thinned to a grid; 0.95 and more on objects.
-EXPLAINED = 0.7
+# all round, and on clouds thinned to a grid; 0.95 and more on objects. Areas that scatter no more than by chance must
+# be nearer: 0.13 to 0.6 on what a camera saw from afar, 0.64 and more on thinned clouds.
+EXPLAINED, BY_CHANCE = 0.7, 0.6
 # They have seen all there is, but for false shadows: 0.91 to 1 of the points, against 0.68 on a torus of rows. Sheets
 # face them as a whole: 0.992 to 1, against 0.93 where too few were found for eight views of a table.
 SEEN, AGREED = 0.85, 0.98
-# Areas scatter as much by chance alone, 0.3 to 0.36 where points lie at random: less tells nothing of several views,
-# nor of what looks closed.
-CHANCE = 0.37
+# Areas scatter as much by chance alone, 0.3 to 0.36 where points lie at random, and to 0.4 where one is kept of each
+# cell of a grid: less tells nothing of several views, nor of what looks closed.
+CHANCE = 0.41
 # No more of them are looked for, and no more than leave this much less unexplained than fewer do.
 MOST, FEWER = 4, 0.95
 # Points that places are looked for with.
@@ -85,7 +86,7 @@ def find_stations(seen: RayDensity) -> Sensors | None:
     if several and tried[0][1] > 0.5 * EXPLAINED * seen.spread:
         tried += _several(summed, np.vstack(places[:-2]), extent)
     found, unexplained = next(one for one in tried if FEWER * one[1] <= min(rest for _, rest in tried))
-    if unexplained >= EXPLAINED * seen.spread:
+    if unexplained >= (EXPLAINED if seen.spread > CHANCE else BY_CHANCE) * seen.spread:
         return None
     if len(found) > 1:
         found = _on_one_side(seen, found, unexplained)

@@ -34,9 +34,8 @@ FEWEST = 100
 WORTH = 0.5
 # Where couplings alone, without field and winding number, tell the same sides at 98 of 100 points (mean sign), a place
 # must see more to turn parts of any size. Else what it sees of the other side counts against it: from beyond a wall of
-# a street most of that is seen as well, and the wall from behind. Parts are turned then where at most a twentieth of
-# what it sees is on the other side.
-AGREED, WORTH_AGREED, ONE_SIDE = 0.96, 0.75, 0.9
+# a street most of that is seen as well, and the wall from behind.
+AGREED, WORTH_AGREED = 0.96, 0.75
 # A place nearby must be clearly better than a direction from afar: a little better is chance.
 NEAR = 0.98
 # Points that places are looked for with.
@@ -65,10 +64,10 @@ def is_open(difference: NDArray[np.float64]) -> bool:
 def sides_from_vantage(
     around: Neighbourhood, normals: NDArray[np.float64], planes: Planes | None = None
 ) -> NDArray[np.float64]:
-    """Turn normals (n, 3) to be on one side as seen from the best place; as they are where no place is good.
+    """Find normals (n, 3) on one side as seen from the best place; on that of those given where no place is good.
 
     That is the side that faces the place. Parts that are on the other side are turned where that is better than leaving
-    them: where more is seen of them than couples them to the rest.
+    them: where more is seen of them than couples them to the rest. Lines are those of planes: of them sides are told.
 
     Parameters
     ----------
@@ -91,34 +90,34 @@ def sides_from_vantage(
     """
     lines, edges, coupling = (planes or planes_of(around)).along(normals)
     joined = cluster_signs(len(around), edges, coupling)
-    signed = abs(float(joined.mean())) > AGREED
+    agreed = abs(float(joined.mean())) > AGREED
     best, score = np.ones(len(around)), WORTH * NEAR
-    for place in _places(around.points, lines, signed):
+    for place in _places(around.points, lines * joined[:, None]):
         evidence = facing(lines, sights(around, place, lines))
         weight = NEAR if place.up is None else 1.0
-        seen, one_sided = weight * float(np.abs(evidence).mean()), weight * abs(float(evidence.mean()))
-        doubted = signed and seen <= WORTH_AGREED * NEAR
+        seen = weight * float(np.abs(evidence).mean())
         # No more than what is seen at all: most places need no more looking at.
-        if (one_sided if doubted else seen) <= score:
+        if seen <= score:
             continue
         # The sides that are known may all be those of the back: what is turned then is turned from that.
         whole = 1.0 if evidence.sum() >= 0 else -1.0
-        sign = settled_signs(edges, coupling, whole * evidence, joined)
-        reached = one_sided if doubted else weight * whole * float((evidence * sign).mean())
-        if reached > score:
-            trusted = not doubted or one_sided > ONE_SIDE * seen
-            best, score = whole * (sign if trusted else np.ones(len(around))), reached
-    return np.asarray(normals * best[:, None])
+        sign, worth = settled_signs(edges, coupling, whole * evidence, joined)
+        if agreed and seen <= WORTH_AGREED * NEAR:
+            worth = abs(float((evidence * joined).mean()))
+        if weight * worth > score:
+            best, score = whole * sign, weight * worth
+    return np.asarray(lines * best[:, None])
 
 
-def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: bool) -> list[Sensors]:
-    """Find the places that see the most of the points (n, 3), face on to their lines (n, 3), the best first.
+def _places(points: NDArray[np.float64], normals: NDArray[np.float64]) -> list[Sensors]:
+    """Find the places that see the most of the points (n, 3), the best first.
 
-    Tried are 26 directions from afar, and places within the box and around it; the best of each then move for as long
-    as they get better, so that one near the sensor of a single view ends there.
+    Tried are 26 directions from afar, by what they see face on; and places within the box and around it, by how much
+    more they see of one side of the normals (n, 3) than of the other. The best of these move for as long as they get
+    better, so that one near the sensor of a single view ends there.
     """
     some = evenly(len(points), LOOKED_WITH)
-    around, few = Neighbourhood(points[some]), lines[some]
+    around, few = Neighbourhood(points[some]), normals[some]
 
     def share(place: Sensors) -> float:
         return float(np.abs(facing(few, sights(around, place, few))).mean())
@@ -131,13 +130,12 @@ def _places(points: NDArray[np.float64], lines: NDArray[np.float64], signed: boo
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     far = max(directions, key=lambda direction: share(Sensors(up=direction)))
     starts = np.vstack([middle + WITHIN * half * lattice(WIDE), middle + half.max() * directions])
-    worth = one_sided if signed else share
-    starts = starts[np.argsort([-worth(Sensors(start)) for start in starts])]
+    starts = starts[np.argsort([-one_sided(Sensors(start)) for start in starts])]
     apart = np.linalg.norm(starts - starts[0], axis=1) > APART * half.max()
     starts = np.vstack([starts[:1], starts[apart][: TRIED - 1]])
-    near = [_climbed(start, worth, 2 * float(half.max())) for start in starts]
+    near = [_climbed(start, one_sided, 2 * float(half.max())) for start in starts]
     places = [(share(Sensors(up=far)), Sensors(up=far)), (share(Sensors(up=-far)), Sensors(up=-far))]
-    places += [(NEAR * worth(Sensors(place)), Sensors(place)) for place in near]
+    places += [(NEAR * one_sided(Sensors(place)), Sensors(place)) for place in near]
     return [place for _, place in sorted(places, key=lambda found: -found[0])]
 
 

@@ -122,8 +122,8 @@ def sides_as_seen(
     >>> mixed = np.outer(np.where(two[:, 2] > 1, -1.0, 1.0), [0.0, 0.0, 1.0])
     >>> around = Neighbourhood(two)
     >>> field = FieldAtPoints(np.ones(400), mixed, np.full(400, 0.1))
-    >>> float(abs(sides_as_seen(around, field, mixed, planes_of(around))[:, 2].mean()))
-    1.0
+    >>> bool(abs(sides_as_seen(around, field, mixed, planes_of(around))[:, 2].mean()) > 0.999)
+    True
     """
     side = sides_from_vantage(around, side, planes)
     says = _field_says(field, side)

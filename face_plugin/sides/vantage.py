@@ -85,8 +85,8 @@ def sides_from_vantage(
     >>> mixed = np.outer(np.where(two[:, 2] > 1, -1.0, 1.0), [0.0, 0.0, 1.0])
     >>> mixed[:20] *= -1.0
     >>> turned = sides_from_vantage(Neighbourhood(two + 0.01 * np.sin(two[:, ::-1])), mixed)
-    >>> float(abs(turned[:, 2].mean()))
-    1.0
+    >>> bool(abs(turned[:, 2].mean()) > 0.999)
+    True
     """
     lines, edges, coupling = (planes or planes_of(around)).along(normals)
     joined = cluster_signs(len(around), edges, coupling)

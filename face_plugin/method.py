@@ -176,12 +176,13 @@ def refine(
     """
     points, neighbour = around.points, around.neighbour
     still = np.zeros(len(points), dtype=np.bool_) if moving is None else ~moving
-    # Plates thinner than the spacing look like noise: there the field alone tells the side, and a fit the angle.
-    plate = back_to_back(around, field.votes)
-
-    # 1. Side.
     closed = not is_open(field.difference)
     as_seen = sights is None and not closed and not still.any()
+    # Plates thinner than the spacing look like noise: there the field alone tells the side, and a fit the angle. Of
+    # what encloses nothing the field tells no side.
+    plate = np.zeros(len(points), dtype=np.bool_) if as_seen else back_to_back(around, field.votes)
+
+    # 1. Side.
     planes = planes_of(around)
     reach = reach or Reach(around)
     side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, reach, still, plate)
@@ -191,8 +192,7 @@ def refine(
             # Of closed bodies the field knows the normals better than planes do.
             side = as_faced(around, unit(blind), side)
     elif as_seen:
-        # What is thinner than the spacing has both of its sides in one place: only the field tells them apart.
-        side = np.where(plate[:, None], side, sides_as_seen(around, field, side, planes))
+        side = sides_as_seen(around, field, side, planes)
     del planes
 
     # 2. Angle: from fits to neighbours on the same smooth piece of the surface, as many as noise asks for and bending
@@ -212,7 +212,7 @@ def refine(
         # The angle is known better now, and so is which side of it was seen.
         refined = resettled(around, refined, sights, unit(blind))
     elif as_seen:
-        refined = np.where(plate[:, None], refined, resettled(around, refined))
+        refined = resettled(around, refined)
     return np.where(still[:, None], field.votes, refined)
 
 

@@ -16,6 +16,7 @@ from face_plugin.method import orient
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides import enclosure
+from face_plugin.sides.belief import believed_stations
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import borne_out, open_parts, parts, told_by
@@ -24,7 +25,6 @@ from face_plugin.sides.reach import Reach
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.sights import sights
-from face_plugin.sides.stations import believed_stations
 from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
 

@@ -10,10 +10,10 @@ from face_plugin import Execution, Params, Side, estimate_normals, shapes
 from face_plugin.cloud import prepare
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.shapes.scans import camera_rays, ring_rays, scan_boxes, sphere_rays
-from face_plugin.sides import stations as search
+from face_plugin.sides import belief
+from face_plugin.sides.belief import believed_stations
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
-from face_plugin.sides.stations import believed_stations
 
 YARD = [
     ((-20.0, -20.0, -0.5), (20.0, 20.0, 0.0)),
@@ -113,7 +113,7 @@ def test_a_mirror_image_behind_a_wall_is_left_out(monkeypatch):
     # From behind the wall at x = 0, which hides all else from it.
     turn = Rotation.random(random_state=0).as_matrix()
     places = cloud.frame.to_unit(np.vstack([true, [[-0.8, 3.4, 1.4]] @ turn.T]))
-    monkeypatch.setattr(search, "find_stations", lambda seen: Sensors(places))
+    monkeypatch.setattr(belief, "find_stations", lambda seen: Sensors(places))
     believed = believed_stations(Neighbourhood(cloud.points))
     assert np.array_equal(believed[0].viewpoints, places[:2])
 

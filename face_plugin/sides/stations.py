@@ -9,24 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
-from face_plugin.geometry import evenly, lattice
+from face_plugin.geometry import lattice
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.facing import facing
-from face_plugin.sides.patches import lines_at, planes_of
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sights import sights
 
-__all__ = ["LOOKED_WITH", "believed_stations", "find_stations"]
+__all__ = ["CHANCE", "LOOKED_WITH", "find_stations"]
 
 # Stations are believed where the logarithms of area are nearer to what they say than to one another by this, by
 # medians: 0.02 to 0.7 on one to four views, generated and real; 0.7 to 1.0 on eight and more, on what a camera saw from
 # all round, and on clouds thinned to a grid; 0.95 and more on objects. Areas that scatter no more than by chance must
 # be nearer: 0.13 to 0.6 on what a camera saw from afar, 0.64 and more on thinned clouds.
 EXPLAINED, BY_CHANCE = 0.7, 0.6
-# They have seen all there is, but for false shadows: 0.91 to 1 of the points, against 0.68 on a torus of rows. Sheets
-# face them as a whole: 0.992 to 1, against 0.93 where too few were found for eight views of a table.
-SEEN, AGREED = 0.85, 0.98
 # Areas scatter as much by chance alone, 0.3 to 0.36 where points lie at random, and to 0.4 where one is kept of each
 # cell of a grid: less tells nothing of several views, nor of what looks closed.
 CHANCE = 0.41
@@ -92,72 +88,6 @@ def find_stations(seen: RayDensity) -> Sensors | None:
         found = _on_one_side(seen, found, unexplained)
         return Sensors(_adjusted(summed, found, unexplained, extent))
     return Sensors(_at_its_height(seen, singles, found, unexplained, extent))
-
-
-def believed_stations(
-    around: Neighbourhood, seen: RayDensity | None = None, *, closed: bool = False
-) -> tuple[Sensors, NDArray[np.float64]] | None:
-    """Find the stations that the density of a cloud tells, and the directions in which points were seen from them.
-
-    None where it tells none, and where too little is in sight of what it tells, or sides would be at odds along sheets.
-
-    Parameters
-    ----------
-    around : Neighbourhood
-        Of n points.
-    seen : RayDensity, optional
-        Some of the points as they were scanned, where `around` is thinned.
-    closed : bool, default: False
-        Whether it is a closed body, or looks like one, as a room does. Most bodies are evenly sampled, which is told at
-        once then. Do not ask of those with nothing inside: they may have been sampled by rays from their middle.
-
-    Returns
-    -------
-    tuple or None
-        The stations, and directions (n, 3) as `sights` has them.
-
-    Examples
-    --------
-    >>> from face_plugin.shapes import sphere
-    >>> believed_stations(Neighbourhood(sphere(1000).points)) is None
-    True
-    """
-    if seen is None:
-        some = evenly(len(around), LOOKED_WITH)
-        seen = RayDensity.of(around, lines_at(around, some), some)
-    if closed and seen.spread < CHANCE:
-        return None
-    stations = find_stations(seen)
-    if stations is None:
-        return None
-    lines, edges, coupling = planes_of(around)
-    stations = _in_accord(around, stations, lines)
-    toward = sights(around, stations, lines)
-    evidence = facing(lines, toward)
-    says = coupling * evidence[edges.first] * evidence[edges.second]
-    if toward.any(axis=1).mean() < SEEN or says.sum() < AGREED * np.abs(says).sum():
-        return None
-    return stations, toward
-
-
-def _in_accord(around: Neighbourhood, stations: Sensors, lines: NDArray[np.float64]) -> Sensors:
-    """Leave out stations that see most of what they see from the other side than all others do.
-
-    One of them is the mirror image, behind a wall, of a true one in front of it: 86 % and more of what it sees is seen
-    from the other side, and of what true ones see 8 % and less.
-    """
-    places = np.atleast_2d(np.asarray(stations.viewpoints))
-    if len(places) == 1:
-        return stations
-    faced = np.array([facing(lines, sights(around, Sensors(place), lines)) for place in places])
-    while True:
-        others = faced.sum(axis=0) - faced
-        seen = np.abs(faced) * (others != 0)
-        against = (seen * (faced * others < 0)).sum(axis=1) / np.maximum(seen.sum(axis=1), np.finfo(float).tiny)
-        worst = int(np.argmax(against))
-        if against[worst] <= 0.5:
-            return Sensors(places)
-        places, faced = np.delete(places, worst, axis=0), np.delete(faced, worst, axis=0)
 
 
 def _over_the_box(box: NDArray[np.float64], extent: float) -> list[NDArray[np.float64]]:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
+from face_plugin.sides.belief import believed_stations
 from face_plugin.sides.enclosure import dim
 from face_plugin.sides.patches import lines_at
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
-from face_plugin.sides.stations import LOOKED_WITH, believed_stations
+from face_plugin.sides.stations import LOOKED_WITH
 from face_plugin.sides.vantage import is_open
 from face_plugin.tiles.store import Store
 

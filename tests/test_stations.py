@@ -118,6 +118,21 @@ def test_a_mirror_image_behind_a_wall_is_left_out(monkeypatch):
     assert np.array_equal(believed[0].viewpoints, places[:2])
 
 
+def test_one_wrong_among_several_is_not_believed(monkeypatch):
+    points, _, true = room(3, 1)
+    cloud = prepare(points)
+    turn = Rotation.random(random_state=1).as_matrix()
+    places = cloud.frame.to_unit(np.vstack([true[:2], [[2.3, -0.8, 0.6]] @ turn.T]))
+    for found_there, lost, kept in (
+        (places, belief.LOST, False),
+        (places, np.inf, True),
+        (places[:2], belief.LOST, True),
+    ):
+        monkeypatch.setattr(belief, "find_stations", lambda seen, found_there=found_there: Sensors(found_there))
+        monkeypatch.setattr(belief, "LOST", lost)
+        assert (believed_stations(Neighbourhood(cloud.points)) is not None) == kept
+
+
 def test_strays_do_not_tell_otherwise():
     points, normals, _ = scan("camera", 1)
     lower, upper = points.min(axis=0), points.max(axis=0)

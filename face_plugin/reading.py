@@ -25,7 +25,6 @@ from face_plugin.sides.reach import Reach
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
 from face_plugin.sides.sights import sights
-from face_plugin.sides.vantage import is_open
 from face_plugin.stages import Stage
 
 __all__ = ["Reading"]
@@ -54,11 +53,7 @@ class Reading:
             return sights(self.around, self.sensors, lines_at(self.around))
         if self.around.plane or self.plane is not None or self.params.angles == "field":
             return None
-        # A closed cloud is asked only where something is so dim that it lies inside a body, or stands in a room.
-        closed = not is_open(self.seen.difference)
-        if closed and not enclosure.dim(self.seen.strength).any():
-            return None
-        found = believed_stations(self.around, closed=closed)
+        found = believed_stations(self.around, difference=self.seen.difference, strength=self.seen.strength)
         return None if found is None else found[1]
 
     @cached_property

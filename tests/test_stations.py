@@ -107,6 +107,23 @@ def test_what_stands_in_a_closed_room_is_not_taken_for_what_lies_inside_a_body(v
     assert not result.interior.any()
 
 
+@pytest.mark.parametrize("seed", [2, 3])
+def test_what_stands_in_a_room_whose_floor_was_taken_out_faces_the_same_space(seed):
+    """Light gets in from below: nothing in it is dark."""
+    made = scan_boxes(ROOM, VIEWS[:2], sphere_rays(30_000), 12_000, np.random.default_rng(seed), noise=0.003)
+    above = made.points[:, 2] > 0.02
+    result = estimate_normals(made.points[above])
+    assert ((result.normals * made.normals[above]).sum(axis=1) > 0).mean() > 0.998
+
+
+@pytest.mark.parametrize("axes", [(1.0, 1.0, 1.0), (1.0, 0.6, 0.4)])
+def test_a_body_sampled_by_rays_from_its_middle_was_not_scanned_from_there(axes):
+    ray = np.random.default_rng(0).normal(size=(6000, 3))
+    points = ray / np.linalg.norm(ray, axis=1, keepdims=True) * np.asarray(axes)
+    result = estimate_normals(points)
+    assert ((result.normals * points).sum(axis=1) > 0).all()
+
+
 def test_a_mirror_image_behind_a_wall_is_left_out(monkeypatch):
     points, _, true = room(2)
     cloud = prepare(points)

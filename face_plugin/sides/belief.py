@@ -8,12 +8,15 @@ from numpy.typing import NDArray
 from face_plugin.geometry import evenly
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.clusters import cluster_signs
+from face_plugin.sides.enclosure import dim
 from face_plugin.sides.facing import facing, sides_by_sensors
+from face_plugin.sides.parts import several_parts
 from face_plugin.sides.patches import Planes, lines_at, planes_of
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sights import sights
 from face_plugin.sides.stations import CHANCE, LOOKED_WITH, find_stations
+from face_plugin.sides.vantage import is_open
 
 __all__ = ["believed_stations"]
 
@@ -26,7 +29,11 @@ LOST = 0.0033
 
 
 def believed_stations(
-    around: Neighbourhood, seen: RayDensity | None = None, *, closed: bool = False
+    around: Neighbourhood,
+    seen: RayDensity | None = None,
+    *,
+    difference: NDArray[np.float64] | None = None,
+    strength: NDArray[np.float64] | None = None,
 ) -> tuple[Sensors, NDArray[np.float64]] | None:
     """Find the stations that the density of a cloud tells, and the directions in which points were seen from them.
 
@@ -38,9 +45,10 @@ def believed_stations(
         Of n points.
     seen : RayDensity, optional
         Some of the points as they were scanned, where `around` is thinned.
-    closed : bool, default: False
-        Whether it is a closed body, or looks like one, as a room does. Most bodies are evenly sampled, which is told at
-        once then. Do not ask of those with nothing inside: they may have been sampled by rays from their middle.
+    difference, strength : (n,) float64, optional
+        What the field says of the points, as of `FieldAtPoints`. A closed body may have been sampled by rays from its
+        middle, and is not asked; a room is closed as well, but something stands in it: in the dark, or as a part of its
+        own. By default the cloud is open.
 
     Returns
     -------
@@ -53,10 +61,14 @@ def believed_stations(
     >>> believed_stations(Neighbourhood(sphere(1000).points)) is None
     True
     """
+    closed = difference is not None and not is_open(difference)
+    if closed and not (strength is not None and dim(strength).any()) and not several_parts(around):
+        return None
     if seen is None:
         some = evenly(len(around), LOOKED_WITH)
         seen = RayDensity.of(around, lines_at(around, some), some)
     if closed and seen.spread < CHANCE:
+        # Most bodies are evenly sampled.
         return None
     stations = find_stations(seen)
     if stations is None:

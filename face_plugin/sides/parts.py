@@ -9,9 +9,10 @@ from face_plugin.faraday.gradient import ROUNDING, FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.result import Side
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
+from face_plugin.sides.patches import lines_at
 from face_plugin.sides.vantage import FEWEST, is_open
 
-__all__ = ["borne_out", "open_parts", "parts", "told_by"]
+__all__ = ["borne_out", "open_parts", "parts", "several_parts", "told_by"]
 
 # Spacings from which neighbours are not of one part, times the square of what couples them. Within a plane scan lines
 # are of one part, seven times as far apart as the points along them; across a right angle, where the coupling is 0.2 to
@@ -44,6 +45,18 @@ def parts(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.int
     joined = length < REACH * spacing * couplings(around.points, normals, edges) ** 2
     everyone = np.ones(len(around), dtype=np.bool_)
     return connected_parts(everyone, Edges(edges.first[joined], edges.second[joined]))[0]
+
+
+def several_parts(around: Neighbourhood) -> bool:
+    """Whether more than one part is large enough to tell whether it is open.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import disjoint_spheres, sphere
+    >>> several_parts(Neighbourhood(sphere(500).points)), several_parts(Neighbourhood(disjoint_spheres(1000).points))
+    (False, True)
+    """
+    return bool((np.bincount(parts(around, lines_at(around))) > FEWEST).sum() > 1)
 
 
 def open_parts(part: NDArray[np.intp], field: FieldAtPoints) -> NDArray[np.bool_]:

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.sides.belief import believed_stations
-from face_plugin.sides.enclosure import dim
 from face_plugin.sides.patches import lines_at
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.stations import LOOKED_WITH
-from face_plugin.sides.vantage import is_open
 from face_plugin.tiles.store import Store
 
 __all__ = ["as_scanned", "stations_of"]
@@ -60,9 +58,6 @@ def stations_of(store: Store) -> Sensors | None:
             found.setdefault(name, []).append(values)
     seen = RayDensity(*(np.concatenate(found[f"scanned_{name}"]) for name in _NAMES))
     with np.load(store.folder / "far.npz") as far:
-        closed = not is_open(far["difference"])
-        if closed and not dim(far["strength"]).any():
-            return None
         around = Neighbourhood(far["points"])
-    believed = believed_stations(around, seen, closed=closed)
+        believed = believed_stations(around, seen, difference=far["difference"], strength=far["strength"])
     return None if believed is None else believed[0]

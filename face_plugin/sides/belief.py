@@ -61,15 +61,14 @@ def believed_stations(
     >>> believed_stations(Neighbourhood(sphere(1000).points)) is None
     True
     """
-    closed = difference is not None and not is_open(difference)
-    if closed and not (strength is not None and dim(strength).any()) and not several_parts(around):
-        return None
     if seen is None:
         some = evenly(len(around), LOOKED_WITH)
         seen = RayDensity.of(around, lines_at(around, some), some)
-    if closed and seen.spread < CHANCE:
-        # Most bodies are evenly sampled.
-        return None
+    if difference is not None and not is_open(difference):
+        # Most bodies are evenly sampled, which is told at once.
+        standing = strength is not None and bool(dim(strength).any())
+        if seen.spread < CHANCE or not (standing or several_parts(around)):
+            return None
     stations = find_stations(seen)
     if stations is None:
         return None

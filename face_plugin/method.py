@@ -29,7 +29,7 @@ from face_plugin.params import Params
 from face_plugin.sides.blind import sides_as_seen, sides_by_field
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
 from face_plugin.sides.facing import as_faced, resettled, sides_by_sensors
-from face_plugin.sides.patches import planes_of
+from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.reach import Reach
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.vantage import is_open
@@ -102,6 +102,7 @@ def orient(
     moving: NDArray[np.bool_] | None = None,
     sights: NDArray[np.float64] | None = None,
     reach: Reach | None = None,
+    planes: Planes | None = None,
 ) -> NDArray[np.float64]:
     """From the field at the points, and what sensors saw, to their normals.
 
@@ -113,7 +114,7 @@ def orient(
     params : Params
     plane : (3,) float64, optional
         Unit normal of the plane that all points lie in.
-    sheets, moving, sights, reach
+    sheets, moving, sights, reach, planes
         As of `refine`.
 
     Returns
@@ -130,7 +131,7 @@ def orient(
     if params.angles == "field" and sights is None:
         # The strength grows outward, so its gradient at a ball points outward (3.4).
         return field.normals
-    return refine(around, field, sheets, moving, sights, reach)
+    return refine(around, field, sheets, moving, sights, reach, planes)
 
 
 def refine(
@@ -140,6 +141,7 @@ def refine(
     moving: NDArray[np.bool_] | None = None,
     sights: NDArray[np.float64] | None = None,
     reach: Reach | None = None,
+    planes: Planes | None = None,
 ) -> NDArray[np.float64]:
     """Refine rough outward normals by the points themselves: first their side, then their angle.
 
@@ -158,6 +160,8 @@ def refine(
         sides then, and the field does not.
     reach : Reach, optional
         Of the points, where it is asked again later.
+    planes : Planes, optional
+        Of the points, where they are known already.
 
     Returns
     -------
@@ -183,7 +187,7 @@ def refine(
     plate = np.zeros(len(points), dtype=np.bool_) if as_seen else back_to_back(around, field.votes)
 
     # 1. Side.
-    planes = planes_of(around)
+    planes = planes or planes_of(around)
     reach = reach or Reach(around)
     side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, reach, still, plate)
     if sights is not None:

@@ -20,7 +20,7 @@ from face_plugin.sides.belief import believed_stations
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.nesting import Nesting, cavities
 from face_plugin.sides.parts import borne_out, open_parts, parts, told_by
-from face_plugin.sides.patches import lines_at
+from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.reach import Reach
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sheets import Sheets
@@ -50,11 +50,19 @@ class Reading:
     def sights(self) -> NDArray[np.float64] | None:
         """Directions (m, 3) in which sensors saw the distinct points: those given, or those that density tells."""
         if self.sensors is not None:
-            return sights(self.around, self.sensors, lines_at(self.around))
-        if self.around.plane or self.plane is not None or self.params.angles == "field":
+            return sights(self.around, self.sensors, self.planes.lines)
+        if not self.refines:
             return None
-        found = believed_stations(self.around, difference=self.seen.difference, strength=self.seen.strength)
+        found = believed_stations(
+            self.around, planes=self.planes, difference=self.seen.difference, strength=self.seen.strength
+        )
         return None if found is None else found[1]
+
+    @property
+    def refines(self) -> bool:
+        """Whether the points refine what the field says, or sensors, of their normals."""
+        by_points = self.params.angles != "field" or self.sensors is not None
+        return by_points and not self.around.plane and self.plane is None
 
     @cached_property
     def seen(self) -> FieldAtPoints:
@@ -65,6 +73,11 @@ class Reading:
     def reach(self) -> Reach:
         """Where free space gets to between the distinct points."""
         return Reach(self.around)
+
+    @cached_property
+    def planes(self) -> Planes:
+        """Planes of the distinct points, which sights, stations and sides ask for."""
+        return planes_of(self.around)
 
     @cached_property
     def as_solids(self) -> NDArray[np.float64]:
@@ -78,6 +91,7 @@ class Reading:
                 sheets=self.sheets,
                 sights=self.sights,
                 reach=self.reach,
+                planes=self.planes if self.refines else None,
             )
 
     @cached_property

@@ -11,7 +11,7 @@ from face_plugin.sides.clusters import cluster_signs
 from face_plugin.sides.enclosure import dim
 from face_plugin.sides.facing import facing, sides_by_sensors
 from face_plugin.sides.parts import several_parts
-from face_plugin.sides.patches import Planes, lines_at, planes_of
+from face_plugin.sides.patches import Planes, planes_of
 from face_plugin.sides.ray_density import RayDensity
 from face_plugin.sides.sensors import Sensors
 from face_plugin.sides.sights import sights
@@ -32,6 +32,7 @@ def believed_stations(
     around: Neighbourhood,
     seen: RayDensity | None = None,
     *,
+    planes: Planes | None = None,
     difference: NDArray[np.float64] | None = None,
     strength: NDArray[np.float64] | None = None,
 ) -> tuple[Sensors, NDArray[np.float64]] | None:
@@ -45,6 +46,8 @@ def believed_stations(
         Of n points.
     seen : RayDensity, optional
         Some of the points as they were scanned, where `around` is thinned.
+    planes : Planes, optional
+        Those of `around`, where they are known.
     difference, strength : (n,) float64, optional
         What the field says of the points, as of `FieldAtPoints`. A closed body may have been sampled by rays from its
         middle, and is not asked; a room is closed as well, but something stands in it: in the dark, or as a part of its
@@ -61,18 +64,18 @@ def believed_stations(
     >>> believed_stations(Neighbourhood(sphere(1000).points)) is None
     True
     """
+    planes = planes or planes_of(around)
     if seen is None:
         some = evenly(len(around), LOOKED_WITH)
-        seen = RayDensity.of(around, lines_at(around, some), some)
+        seen = RayDensity.of(around, planes.lines[some], some)
     if difference is not None and not is_open(difference):
         # Most bodies are evenly sampled, which is told at once.
         standing = strength is not None and bool(dim(strength).any())
-        if seen.spread < CHANCE or not (standing or several_parts(around)):
+        if seen.spread < CHANCE or not (standing or several_parts(around, planes.lines)):
             return None
     stations = find_stations(seen)
     if stations is None:
         return None
-    planes = planes_of(around)
     stations = _in_accord(around, stations, planes.lines)
     toward = sights(around, stations, planes.lines)
     evidence = facing(planes.lines, toward)

@@ -9,7 +9,6 @@ from face_plugin.faraday.gradient import ROUNDING, FieldAtPoints
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.result import Side
 from face_plugin.sides.graph import Edges, connected_parts, couplings, neighbours_around
-from face_plugin.sides.patches import lines_at
 from face_plugin.sides.vantage import FEWEST, is_open
 
 __all__ = ["borne_out", "open_parts", "parts", "several_parts", "told_by"]
@@ -47,16 +46,24 @@ def parts(around: Neighbourhood, normals: NDArray[np.float64]) -> NDArray[np.int
     return connected_parts(everyone, Edges(edges.first[joined], edges.second[joined]))[0]
 
 
-def several_parts(around: Neighbourhood) -> bool:
+def several_parts(around: Neighbourhood, normals: NDArray[np.float64]) -> bool:
     """Whether more than one part is large enough to tell whether it is open.
+
+    Parameters
+    ----------
+    around : Neighbourhood
+        Of n points.
+    normals : (n, 3) float64
+        Of either sign.
 
     Examples
     --------
     >>> from face_plugin.shapes import disjoint_spheres, sphere
-    >>> several_parts(Neighbourhood(sphere(500).points)), several_parts(Neighbourhood(disjoint_spheres(1000).points))
-    (False, True)
+    >>> one, two = sphere(500), disjoint_spheres(1000)
+    >>> [several_parts(Neighbourhood(some.points), some.normals) for some in (one, two)]
+    [False, True]
     """
-    return bool((np.bincount(parts(around, lines_at(around))) > FEWEST).sum() > 1)
+    return bool((np.bincount(parts(around, normals)) > FEWEST).sum() > 1)
 
 
 def open_parts(part: NDArray[np.intp], field: FieldAtPoints) -> NDArray[np.bool_]:

@@ -29,7 +29,7 @@ from face_plugin.params import Params
 from face_plugin.sides.blind import sides_as_seen, sides_by_field
 from face_plugin.sides.curves import curve_separation, lines_of_curves, sides_of_curves
 from face_plugin.sides.facing import as_faced, resettled, sides_by_sensors
-from face_plugin.sides.patches import Planes, planes_of
+from face_plugin.sides.patches import Planes, planes_of, shared_planes
 from face_plugin.sides.reach import Reach
 from face_plugin.sides.sheets import Sheets, back_to_back, cage_separation, find_sheets
 from face_plugin.sides.vantage import is_open
@@ -190,6 +190,9 @@ def refine(
     planes = planes or planes_of(around)
     reach = reach or Reach(around)
     side = blind = sides_by_field(around, field, sheets or find_sheets(around), planes, reach, still, plate)
+    if sights is not None or as_seen:
+        # Sides are told of lines, and at the foot of a wall those of the nearest points are of neither sheet.
+        planes = shared_planes(around, planes, sights)
     if sights is not None:
         side = sides_by_sensors(around, sights, unit(blind), planes)
         if closed:

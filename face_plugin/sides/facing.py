@@ -64,7 +64,7 @@ def sides_by_sensors(
     >>> bool(((inward * ball.normals).sum(axis=1) < 0).all())
     True
     """
-    lines, edges, coupling = planes or planes_of(around)
+    lines, edges, coupling, _ = planes or planes_of(around)
     evidence = _evidence(lines, seen, blind)
     sign = cut_signs(cluster_signs(len(around), edges, coupling, evidence), edges, coupling, evidence)
     return np.asarray(lines * sign[:, None])

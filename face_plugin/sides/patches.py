@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from face_plugin.consensus import consensus_lines
 from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.planes import plane_fits
 from face_plugin.sides.clusters import cluster_signs
@@ -36,6 +37,7 @@ __all__ = [
     "closure",
     "lines_at",
     "planes_of",
+    "shared_planes",
     "turned_patches",
     "winding_number",
 ]
@@ -97,12 +99,14 @@ class Planes(NamedTuple):
     """Along the planes."""
     coupling: NDArray[np.float64]
     """(e,) as of `couplings`; less where the points lie on no plane."""
+    flatness: NDArray[np.float64]
+    """(n,) as of `plane_fits`."""
 
     def along(self, normals: NDArray[np.float64]) -> Planes:
         """Turn the lines to the side of normals (n, 3)."""
         side = np.where(np.einsum("nd,nd->n", self.lines, normals) < 0, -1.0, 1.0)
         coupling = self.coupling * side[self.edges.first] * side[self.edges.second]
-        return Planes(self.lines * side[:, None], self.edges, coupling)
+        return self._replace(lines=self.lines * side[:, None], coupling=coupling)
 
 
 def planes_of(around: Neighbourhood) -> Planes:
@@ -115,10 +119,30 @@ def planes_of(around: Neighbourhood) -> Planes:
     >>> planes.lines.shape, bool((planes.coupling > 0).mean() > 0.4)
     ((500, 3), True)
     """
-    lines, flatness = _fitted(around, slice(None))
+    return _coupled(around, *_fitted(around, slice(None)))
+
+
+def shared_planes(around: Neighbourhood, planes: Planes, seen: NDArray[np.float64] | None = None) -> Planes:
+    """Find planes that many neighbours share, as `consensus_lines` does, from those of a neighbourhood.
+
+    `seen` (n, 3) are directions in which sensors saw the points, where they are known.
+
+    Examples
+    --------
+    >>> from face_plugin.shapes import sphere
+    >>> around = Neighbourhood(sphere(500).points)
+    >>> bool((shared_planes(around, planes_of(around)).lines == planes_of(around).lines).all())
+    True
+    """
+    lines = consensus_lines(around, planes.lines, seen)
+    return _coupled(around, lines, planes.flatness)
+
+
+def _coupled(around: Neighbourhood, lines: NDArray[np.float64], flatness: NDArray[np.float64]) -> Planes:
     edges = neighbours_around(around, lines)
     trust = flatness**2
-    return Planes(lines, edges, couplings(around.points, lines, edges) * trust[edges.first] * trust[edges.second])
+    coupling = couplings(around.points, lines, edges) * trust[edges.first] * trust[edges.second]
+    return Planes(lines, edges, coupling, flatness)
 
 
 def lines_at(around: Neighbourhood, some: slice | NDArray[np.intp] = slice(None)) -> NDArray[np.float64]:
@@ -183,7 +207,7 @@ def turned_patches(
     """
     closed = closure(around, normals)
     if planes is not None:
-        _, edges, coupling = planes.along(normals)
+        _, edges, coupling, _ = planes.along(normals)
         sign = cluster_signs(len(around), edges, coupling)
     else:
         edges = neighbours_around(around, normals)

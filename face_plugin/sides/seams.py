@@ -53,7 +53,7 @@ def across_seams(
     """
     count = len(around)
     # Normals bend where sides change, the lines of planes do not.
-    lines, edges, coupling = (planes or planes_of(around)).along(normals)
+    lines, edges, coupling, _ = (planes or planes_of(around)).along(normals)
     seam = np.flatnonzero(coupling < -SMOOTH)
     seam = seam[both_alone(around, lines, edges.first[seam], edges.second[seam], NEAR_BY)]
     if len(seam) < SMALLEST:

@@ -88,7 +88,7 @@ def sides_from_vantage(
     >>> bool(abs(turned[:, 2].mean()) > 0.999)
     True
     """
-    lines, edges, coupling = (planes or planes_of(around)).along(normals)
+    lines, edges, coupling, _ = (planes or planes_of(around)).along(normals)
     joined = cluster_signs(len(around), edges, coupling)
     agreed = abs(float(joined.mean())) > AGREED
     best, score = np.ones(len(around)), WORTH * NEAR

@@ -9,8 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from face_plugin.cloud import Frame
+from face_plugin.threads import KDTree
 
-__all__ = ["Sensors", "sensors_of"]
+__all__ = ["MOST_VIEWPOINTS", "Sensors", "sensors_of"]
+
+# Viewpoints of a trajectory that stand for all.
+MOST_VIEWPOINTS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,22 @@ class Sensors:
         if self.seen_from is None or kept.all():
             return self
         return Sensors(self.viewpoints, self._rows(len(kept))[kept], self.up)
+
+    def about(self, points: NDArray[np.float64]) -> Sensors:
+        """Leave out, of more viewpoints than are looked from, those that are the nearest to none of the points (m, 3).
+
+        A part of a long street is seen from what little of the trajectory passes it.
+
+        Examples
+        --------
+        >>> drive = Sensors(np.arange(100.0)[:, None] * [1.0, 0.0, 0.0])
+        >>> drive.about(np.array([[3.2, 5.0, 0.0], [7.9, -5.0, 0.0]])).viewpoints[:, 0]
+        array([3., 8.])
+        """
+        views = np.asarray(self.viewpoints)
+        if self.viewpoints is None or self.seen_from is not None or len(views) <= MOST_VIEWPOINTS:
+            return self
+        return Sensors(views[np.unique(KDTree(views).query(points)[1])], None, self.up)
 
     def _rows(self, count: int) -> NDArray[np.intp]:
         """Rows of the viewpoints, one for each of so many points."""

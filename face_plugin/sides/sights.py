@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from face_plugin.neighbourhood import Neighbourhood
-from face_plugin.sides.sensors import Sensors
+from face_plugin.sides.sensors import MOST_VIEWPOINTS, Sensors
 from face_plugin.threads import KDTree
 
 __all__ = ["lit", "sights", "visible"]
@@ -29,8 +29,6 @@ IN_PLANE = 0.35
 LOOKED_AT = 4
 # Octaves of apparent size told apart; larger and smaller ones count as the last.
 OCTAVES = 12
-# Viewpoints of a trajectory that stand for all: the farthest from one another.
-MOST_VIEWPOINTS = 12
 # Distance from which a direction is looked along, in diagonals of the cloud.
 FAR_AWAY = 1000.0
 
@@ -40,6 +38,7 @@ def visible(
     spacing: NDArray[np.float64],
     viewpoint: NDArray[np.float64],
     lines: NDArray[np.float64],
+    asked: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Which points (n,) no other one hides from a viewpoint.
 
@@ -51,6 +50,8 @@ def visible(
     viewpoint : (3,) float64
     lines : (n, 3) float64
         Unit normals of either sign, roughly.
+    asked : (n,) bool, optional
+        Points that it is asked of; none of the others is found visible.
 
     Examples
     --------
@@ -61,6 +62,8 @@ def visible(
     (True, False)
     """
     seen = (points != viewpoint).any(axis=1)
+    if asked is not None:
+        seen &= asked
     for at, blocker, gap in _in_the_way(points, seen, points, spacing, viewpoint):
         hidden = gap > BEHIND * np.maximum(spacing[at, None], spacing[blocker])
         some = np.flatnonzero(hidden.any(axis=1))
@@ -128,14 +131,17 @@ def _in_the_way(
         yield at, blocker, np.where(apart < size[blocker], away[at, None] - distance[blocker], -np.inf)
 
 
-def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) -> NDArray[np.float64]:
+def sights(
+    around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64], asked: NDArray[np.bool_] | None = None
+) -> NDArray[np.float64]:
     """Sum (n, 3) of the directions in which each point is seen; of length 0 where no sensor sees it.
 
     The direction to the nearest viewpoint that sees a point is of length 1, and those to others are shorter by the
     squares of the distances: a sensor puts points on a surface by ``cos(angle) / distance^2``, and a thin wall that is
     seen from both sides was scanned from where it has most points.
 
-    `lines` (n, 3) are unit normals of either sign, roughly, such as those of planes.
+    `lines` (n, 3) are unit normals of either sign, roughly, such as those of planes. Points that are not `asked` (n,)
+    are left out; by default none is.
     """
     points = around.points
     total, nearest = np.zeros_like(points), np.full(len(points), np.inf)
@@ -149,13 +155,13 @@ def sights(around: Neighbourhood, sensors: Sensors, lines: NDArray[np.float64]) 
         return total
     near = len(views) - (sensors.up is not None)
     for view in _spread(views[:near]):
-        seen = visible(points, around.spacing, view, lines) & ~told
+        seen = visible(points, around.spacing, view, lines, asked) & ~told
         squared = np.sum((points[seen] - view) ** 2, axis=1)
         total[seen] += _toward(points[seen], view) / squared[:, None]
         nearest[seen] = np.minimum(nearest[seen], squared)
     total[~told] *= np.where(np.isfinite(nearest), nearest, 1.0)[~told, None]
     for view in views[near:]:
-        seen = visible(points, around.spacing, view, lines) & ~told
+        seen = visible(points, around.spacing, view, lines, asked) & ~told
         total[seen] += _toward(points[seen], view)
     return total
 

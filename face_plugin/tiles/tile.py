@@ -27,7 +27,7 @@ from face_plugin.neighbourhood import Neighbourhood
 from face_plugin.params import Params
 from face_plugin.sides.confidence import confidence, witness
 from face_plugin.sides.enclosure import enclosed
-from face_plugin.sides.patches import lines_at
+from face_plugin.sides.patches import planes_of
 from face_plugin.sides.sheets import find_sheets
 from face_plugin.sides.sights import sights
 from face_plugin.sides.strays import find_strays
@@ -181,10 +181,14 @@ def _orient(store: Store, tile: int) -> dict[str, NDArray[np.generic]]:
         seen = scene(store, tile)
         around = Neighbourhood(seen.points)
     with clock("refine"):
-        seen_by = None if store.sensors is None else sights(around, store.sensors, lines_at(around))
+        seen_by = planes = None
+        if store.sensors is not None:
+            planes = planes_of(around)
+            seen_by = sights(around, store.sensors.about(seen.points[seen.own]), planes.lines, seen.near)
         normals = orient(
-            around, seen.field, store.params, plane=store.plane, sheets=seen.sheets, moving=seen.near, sights=seen_by
-        )
+            around, seen.field, store.params,
+            plane=store.plane, sheets=seen.sheets, moving=seen.near, sights=seen_by, planes=planes,
+        )  # fmt: skip
         own, stray = seen.own, seen.stray[seen.own]
         # A stray is given the normal of the nearest point that is none.
         sound = np.flatnonzero(~seen.stray)

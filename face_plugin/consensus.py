@@ -19,8 +19,6 @@ from face_plugin.threads import in_threads
 
 __all__ = ["consensus_lines"]
 
-# Neighbours whose planes the lines are.
-NEAREST = 30
 # A plane passes through what lies within so many standard deviations of it.
 DEVIATIONS = 3.0
 # Standard deviation of the points: that of the plane of each point's neighbours which so many others come below. Points
@@ -44,7 +42,7 @@ ROW = 1.2
 
 
 def consensus_lines(
-    around: Neighbourhood, lines: NDArray[np.float64], seen: NDArray[np.float64] | None = None
+    around: Neighbourhood, lines: NDArray[np.float64], count: int, seen: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
     """Find the lines of shared planes, where those through the nearest points fit these less than others do.
 
@@ -54,6 +52,8 @@ def consensus_lines(
         Of n points.
     lines : (n, 3) float64
         Unit normals, of either sign, of planes through the nearest points.
+    count : int
+        How many these are, without the point itself.
     seen : (n, 3) float64, optional
         Directions in which each point was seen; of any length, 0 where it is not known. No surface contains them, but a
         plane through a single row of a scan does, also where that turns from the ground up a wall.
@@ -70,14 +70,14 @@ def consensus_lines(
     >>> corner = np.concatenate([np.stack([x, y, 0.0 * x], axis=1), np.stack([0.0 * x, y, x], axis=1)])
     >>> near = Neighbourhood(corner)
     >>> lines = plane_fit(corner, near.distance, near.neighbour, 30, 1.0)
-    >>> shared = consensus_lines(near, lines)
+    >>> shared = consensus_lines(near, lines, 30)
     >>> right = [float((np.abs(of).max(axis=1) > 0.999).mean()) for of in (lines, shared)]
     >>> right[0] < 0.8, right[1]
     (True, 1.0)
     """
     points, near = around.points, around.neighbour
-    centre = points[near[:, : NEAREST + 1]].mean(axis=1)
-    off = _off(points, near[:, : NEAREST + 1], lines, centre)
+    centre = points[near[:, : count + 1]].mean(axis=1)
+    off = _off(points, near[:, : count + 1], lines, centre)
     deviation = np.sqrt(np.einsum("nk,nk->n", off, off) / off.shape[1])
     lowest = min(LOWEST, near.shape[1] - 1)
     width = DEVIATIONS * np.partition(deviation[near], lowest, axis=1)[:, lowest]

@@ -54,7 +54,7 @@ def test_the_foot_of_a_wall_belongs_to_the_ground_or_to_the_wall(street, around,
 
 def test_a_plane_that_holds_a_line_of_sight_is_no_surface(around, seen):
     lines = planes_of(around).lines
-    found = consensus_lines(around, lines, seen)
+    found = consensus_lines(around, lines, 30, seen)
     new = (found != lines).any(axis=1)
     assert new.sum() > 100
     assert np.abs(np.einsum("nd,nd->n", found, seen))[new].min() >= 0.1
@@ -68,7 +68,7 @@ def test_a_single_row_shares_no_plane():
     row = np.column_stack([row, np.zeros(len(row))]) + 0.01 * rng.normal(size=(len(row), 3))
     around = Neighbourhood(row)
     lines = np.tile([1.0, 0.0, 0.0], (len(row), 1))
-    np.testing.assert_array_equal(consensus_lines(around, lines), lines)
+    np.testing.assert_array_equal(consensus_lines(around, lines, 30), lines)
 
 
 def test_rough_ground_keeps_its_planes():
@@ -77,7 +77,7 @@ def test_rough_ground_keeps_its_planes():
     ground = np.column_stack([rng.uniform(0, 40, (4000, 2)), rng.normal(size=4000)])
     around = Neighbourhood(ground)
     lines = planes_of(around).lines
-    assert (consensus_lines(around, lines) != lines).any(axis=1).mean() < 0.01
+    assert (consensus_lines(around, lines, 30) != lines).any(axis=1).mean() < 0.01
 
 
 def test_the_best_plane_is_that_of_a_slow_count(around):

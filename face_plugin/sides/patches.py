@@ -134,7 +134,7 @@ def shared_planes(around: Neighbourhood, planes: Planes, seen: NDArray[np.float6
     >>> bool((shared_planes(around, planes_of(around)).lines == planes_of(around).lines).all())
     True
     """
-    lines = consensus_lines(around, planes.lines, seen)
+    lines = consensus_lines(around, planes.lines, PLANE_NEIGHBOURS, seen)
     return _coupled(around, lines, planes.flatness)
 
 
